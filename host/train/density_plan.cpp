@@ -37,9 +37,11 @@ void choose(std::vector<Candidate>& candidates,
             std::vector<Fate>& fates,
             DensityPlan& plan) {
   if (candidates.size() <= room) return;
-  std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
-    return a.score != b.score ? a.score > b.score : a.index < b.index;
-  });
+  const auto last = candidates.begin() + static_cast<std::ptrdiff_t>(room);
+  std::nth_element(candidates.begin(), last, candidates.end(),
+                   [](const Candidate& a, const Candidate& b) {
+                     return a.score != b.score ? a.score > b.score : a.index < b.index;
+                   });
   plan.refused = candidates.size() - room;
   for (std::size_t k = room; k < candidates.size(); ++k) fates[candidates[k].index] = Fate::kKeep;
   candidates.resize(room);

@@ -154,16 +154,11 @@ TEST_CASE("gradients of packets that are sorted because rays reach the cap on hi
   }
 }
 
-// Ellipsoids around one place, which overlap in depth from the first to the last: as many rows are
-// open at once as there are Gaussians.
 TEST_CASE("gradients of packets with more rows open than either launch of a group keeps") {
   Context context = make_test_context();
   for (const std::size_t count : {20, 50, 150}) {
     CAPTURE(count);
-    Gaussians model = reference::random_scene(count, 5, 1);
-    for (float& mean : model.means) mean *= 0.05f;
-    for (float& scale : model.log_scales) scale = 0.2f * scale + std::log(0.4f);
-    for (float& opacity : model.opacities) opacity = -4.0f;
+    const Gaussians model = crowded_scene(count);
     TraceOptions options;
     options.min_transmittance = 1e-6f;
     for (const Packet& packet : packets({16}, {8, 32, 64})) {

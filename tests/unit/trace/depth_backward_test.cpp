@@ -155,6 +155,14 @@ TEST_CASE("the gradient of depth equals finite differences for packets and group
   }
 }
 
+TEST_CASE(
+    "the gradient of depth of packets with more rows open than a group's first launch keeps") {
+  TraceOptions options;
+  options.packet_shape = PacketShape::kGroup;
+  options.min_transmittance = 1e-6f;
+  check_against_differences(crowded_scene(50), options, reference::cube_camera(16, 14));
+}
+
 TEST_CASE("the gradient of depth holds for Gaussians beside and behind the camera plane") {
   const Camera camera = look_at({0.1, -0.2, 0.15}, {1, 0.3, 0.5}, {0, 1, 0}, 9, 8, 7);
   check_against_differences(reference::random_scene(60, 24, 0), {}, camera);

@@ -52,6 +52,16 @@ inline std::vector<Packet> packets(const std::vector<int>& vectors = {1, 2, 4, 8
   return out;
 }
 
+/// Ellipsoids around one place, which overlap in depth from the first to the last: a packet has as
+/// many rows open at once as there are Gaussians.
+inline Gaussians crowded_scene(std::size_t count) {
+  Gaussians out = reference::random_scene(count, 5, 1);
+  for (float& mean : out.means) mean *= 0.05f;
+  for (float& scale : out.log_scales) scale = 0.2f * scale + std::log(0.4f);
+  for (float& opacity : out.opacities) opacity = -4.0f;
+  return out;
+}
+
 struct Difference {
   double mean = 0;          ///< absolute, over compared values
   double maximum = 0;       ///< over pixels that are no near-ties
