@@ -39,6 +39,12 @@
   __global access float *restrict transmittances, __global access uint2 *restrict stream_ends, \
       __global access uint2 *restrict pool, __global access float *restrict pool_transmittance
 
+// What a backward pass of packets reads, and the lines' gradients that it adds to.
+#define RS_BACKWARD_ARGUMENTS                                                               \
+  RS_VIEW_ARGUMENTS, const RsBackward backward_argument, RS_STREAM_ARGUMENTS(const),        \
+      __global const RsLine *restrict lines, __global const float *restrict image_gradient, \
+      __global const float *restrict depth_gradient, __global float *restrict gradients
+
 // Rays and the order in which they are taken, read when `ordered`.
 #define RS_RAY_ARGUMENTS \
   __global const RsRay *restrict rays, const int ordered, __global const uint *restrict ray_order

@@ -23,7 +23,6 @@
 #include "trace/arguments.h"
 #include "trace/hit_stream.h"
 #include "trace/line_gradient.h"
-#include "trace/line_sum.h"
 #include "trace/packet.h"
 
 #ifndef TILE
@@ -90,9 +89,6 @@ void add_gradient(const Pixels* p,
 // Returns its T alpha (colour . gradient), which lies behind everything still to come.
 fv close_row(StreamWindow* rows,
              const Pixels* p,
-             const fv T,
-             const fv T_last,
-             const float4 background,
              __global const RsLine* restrict lines,
              const LineSums* sums) {
   const uint slot = rows->head;
@@ -101,11 +97,10 @@ fv close_row(StreamWindow* rows,
   const fv alpha = rows->alpha[slot];
   const fv before = rows->before[slot];
   const fv weight = before * alpha;
-  const fv sky = background.x * p->gR + background.y * p->gG + background.z * p->gB;
   // Only the last hit of a ray can be opaque, and only the background is behind that.
   const fv passed = 1.0f / (1.0f - alpha);
-  const fv behind =
-      select((rows->behind[slot] + T * sky) * passed, before * sky, RS_MASK(before <= T_last));
+  const fv behind = select((rows->behind[slot] + p->T * p->sky) * passed, before * p->sky,
+                           RS_MASK(before <= p->T_last));
   const iv mine = RS_MASK(before > 0.0f);
   const fv g_alpha = select((fv)(0.0f), before * rows->projected[slot] - behind, mine);
   add_gradient(p, rows->reference[slot], g_alpha, alpha, weight, lines, sums);
@@ -124,30 +119,16 @@ void fetch_chunk(const uint chunk,
   for (uint n = 1; n < CHUNK; ++n) RS_PREFETCH_READ(pool_transmittance + (first + n) * PACKET);
 }
 
-void packet_backward(const RsCamera* camera,
-                     __global const float* restrict tangents,
-                     const int px,
-                     const int py,
-                     __global const RsLine* restrict lines,
-                     __global const float* restrict image_gradient,
-                     __global const float* restrict depth_gradient,
-                     __global const float* restrict transmittances,
-                     __global const uint2* restrict stream_ends,
-                     __global const uint2* restrict pool,
-                     __global const float* restrict pool_transmittance,
-                     const float4 background,
-                     const float screen_x,
-                     const float screen_y,
-                     const LineSums* sums) {
-  const int width = camera->width, height = camera->height;
-  const uint packets_x = (width + PACKET_WIDTH - 1) / PACKET_WIDTH;
-  const uint2 tail = stream_ends[(py / PACKET_HEIGHT) * packets_x + px / PACKET_WIDTH];
+// Inlined: else its argument would lie in memory, which is private to a ray on GPUs.
+__attribute__((always_inline)) void packet_backward(const BackwardScene scene,
+                                                    const int px,
+                                                    const int py) {
+  const uint packets_x = (scene.camera->width + PACKET_WIDTH - 1) / PACKET_WIDTH;
+  const uint2 tail = scene.stream_ends[(py / PACKET_HEIGHT) * packets_x + px / PACKET_WIDTH];
   if (tail.x == RS_NO_CHUNK) return;
-  const size_t plane = (size_t)width * height;
   Pixels p;
-  load_pixels(&p, camera, tangents, image_gradient, depth_gradient, screen_x, screen_y, px, py);
-  const fv T = rs_load_pixels(transmittances, width, height, px, py);
-  const fv T_last = rs_load_pixels(transmittances + plane, width, height, px, py);
+  load_pixels(&p, scene, px, py);
+  const LineSums sums = scene.sums;
   StreamWindow rows;
   rows.head = rows.size = 0;
   fv behind = (fv)(0.0f);  // of closed rows: farther than all that are open or still to come
@@ -157,21 +138,21 @@ void packet_backward(const RsCamera* camera,
   uint used = tail.y;
   while (chunk != RS_NO_CHUNK) {
     const size_t first = (size_t)chunk * CHUNK;
-    const uint next = pool[first].x;
-    if (next != RS_NO_CHUNK) fetch_chunk(next, pool, pool_transmittance);
+    const uint next = scene.pool[first].x;
+    if (next != RS_NO_CHUNK) fetch_chunk(next, scene.pool, scene.pool_transmittance);
     for (uint n = used - 1; n > 0; --n) {
-      const uint gaussian = pool[first + n].x >> 1;
-      RS_PREFETCH_READ(lines + gaussian);
-      rs_fetch_line(sums, gaussian);
+      const uint gaussian = scene.pool[first + n].x >> 1;
+      RS_PREFETCH_READ(scene.lines + gaussian);
+      rs_fetch_line(&sums, gaussian);
     }
     for (uint n = used - 1; n > 0; --n, --number) {
       while (rows.size > 0 && rows.oldest[rows.head] > number) {
-        behind += close_row(&rows, &p, T, T_last, background, lines, sums);
+        behind += close_row(&rows, &p, scene.lines, &sums);
       }
-      const fv before = rs_load(pool_transmittance + (first + n) * PACKET);
+      const fv before = rs_load(scene.pool_transmittance + (first + n) * PACKET);
       if (!rs_any(RS_MASK(before > 0.0f))) continue;
-      const uint2 row = pool[first + n];
-      __global const float* v = lines[row.x >> 1].v;
+      const uint2 row = scene.pool[first + n];
+      __global const float* v = scene.lines[row.x >> 1].v;
       const PacketMeeting m = rs_meet(v, row.x & 1, 0.0f, p.X, p.Y);
       const fv alpha = v[12] * rs_exp(-0.5f * m.numerator / m.direction2);
       const fv projected = rs_projected(&p, v, &m);
@@ -196,28 +177,20 @@ void packet_backward(const RsCamera* camera,
     chunk = next;
     used = CHUNK;
   }
-  while (rows.size > 0) close_row(&rows, &p, T, T_last, background, lines, sums);
+  while (rows.size > 0) close_row(&rows, &p, scene.lines, &sums);
 }
 
-__kernel void trace_backward(RS_VIEW_ARGUMENTS,
-                             const RsBackward backward_argument,
-                             RS_STREAM_ARGUMENTS(const),
-                             __global const RsLine* restrict lines,
-                             __global const float* restrict image_gradient,
-                             __global const float* restrict depth_gradient,
-                             __global float* restrict gradients) {
+__kernel void trace_backward(RS_BACKWARD_ARGUMENTS) {
   const RsCamera camera = camera_argument;
   const RsBackward backward = backward_argument;
   const uint tiles_x = backward.tiles_x, tile_row = backward.tile_row;
-  const float4 background =
-      (float4)(backward.background[0], backward.background[1], backward.background[2], 0.0f);
-  LineSums sums;
-  sums.lines = gradients;
-  sums.limit = backward.limit;
+  BackwardScene scene =
+      backward_scene(&camera, &backward, tangents, transmittances, stream_ends, pool,
+                     pool_transmittance, lines, image_gradient, depth_gradient, gradients);
 #if PRIVATE_COPIES
   // Tiles are numbered over the whole image, so that the sums do not depend on the bands.
   const uint group = get_global_id(0);
-  sums.lines += (size_t)group * backward.gaussians * 16;
+  scene.sums.lines += (size_t)group * backward.gaussians * 16;
   const uint groups = backward.copies;
   const uint first = tile_row * tiles_x, end = first + backward.tile_rows * tiles_x;
   for (uint tile = first + (group + groups - first % groups) % groups; tile < end; tile += groups) {
@@ -226,9 +199,7 @@ __kernel void trace_backward(RS_VIEW_ARGUMENTS,
     const int y0 = tile / tiles_x * TILE;
     for (int y = y0; y < min(y0 + TILE, camera.height); y += PACKET_HEIGHT) {
       for (int x = x0; x < min(x0 + TILE, camera.width); x += PACKET_WIDTH) {
-        packet_backward(&camera, tangents, x, y, lines, image_gradient, depth_gradient,
-                        transmittances, stream_ends, pool, pool_transmittance, background,
-                        backward.screen_x, backward.screen_y, &sums);
+        packet_backward(scene, x, y);
       }
     }
   }
@@ -237,8 +208,6 @@ __kernel void trace_backward(RS_VIEW_ARGUMENTS,
   const int y = get_global_id(1) * PACKET_HEIGHT + tile_row * TILE;
   if (x >= camera.width || y >= camera.height) return;
   if (!rs_on_face(tiles, face, y / TILE * tiles_x + x / TILE)) return;
-  packet_backward(&camera, tangents, x, y, lines, image_gradient, depth_gradient, transmittances,
-                  stream_ends, pool, pool_transmittance, background, backward.screen_x,
-                  backward.screen_y, &sums);
+  packet_backward(scene, x, y);
 #endif
 }

@@ -17,7 +17,6 @@
 #include "trace/group.h"
 #include "trace/hit_stream.h"
 #include "trace/line_gradient.h"
-#include "trace/line_sum.h"
 
 // Numbers of a line that are summed at once, and parts in which the rays of a group are, so that
 // all work-items have a share.
@@ -105,14 +104,10 @@ RS_GROUP_INLINE void close_row(__local BackwardMemory* memory,
                                const int lane,
                                const uint slot,
                                const Pixels* p,
-                               const float T,
-                               const float T_last,
-                               const float sky,
-                               __global const RsLine* restrict lines,
-                               const LineSums* sums,
+                               const BackwardScene scene,
                                ClosedHit* closed) {
   const uint reference = memory->reference[slot];
-  __global const float* v = lines[reference >> 1].v;
+  __global const float* v = scene.lines[reference >> 1].v;
   const PacketMeeting m = rs_meet(v, reference & 1, 0.0f, p->X, p->Y);
   const float alpha = group_alpha(v, &m);
   const float before = rs_row_get(memory->before, own->before, slot, lane);
@@ -123,45 +118,28 @@ RS_GROUP_INLINE void close_row(__local BackwardMemory* memory,
   }
   const float projected = rs_projected(p, v, &m);
   // Only the last hit of a ray can be opaque, and only the background is behind that.
-  const float behind = before <= T_last ? before * sky
-                                        : (from_here - before * alpha * projected + T * sky) *
-                                              (1.0f / (1.0f - alpha));
+  const float behind =
+      before <= p->T_last
+          ? before * p->sky
+          : (from_here - before * alpha * projected + p->T * p->sky) * (1.0f / (1.0f - alpha));
   const float g_alpha = before > 0.0f ? before * projected - behind : 0.0f;
   float g[16];
   line_gradient(p, reference & 1, v, g_alpha, alpha, before * alpha, g);
-  group_add_line(memory, lane, sums, reference >> 1, g);
+  group_add_line(memory, lane, &scene.sums, reference >> 1, g);
 }
 
 // `works`: whether there is a packet at (group_x, group_y); otherwise nothing happens.
 RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
                                     const int lane,
                                     const bool works,
-                                    const RsCamera* camera,
-                                    __global const float* restrict tangents,
+                                    const BackwardScene scene,
                                     const int group_x,
-                                    const int group_y,
-                                    __global const RsLine* restrict lines,
-                                    __global const float* restrict image_gradient,
-                                    __global const float* restrict depth_gradient,
-                                    __global const float* restrict transmittances,
-                                    __global const uint2* restrict stream_ends,
-                                    __global const uint2* restrict pool,
-                                    __global const float* restrict pool_transmittance,
-                                    const float4 background,
-                                    const float screen_x,
-                                    const float screen_y,
-                                    const LineSums* sums) {
-  const int width = camera->width, height = camera->height;
-  const uint2 tail =
-      works ? stream_ends[rs_group_number(width, group_x, group_y)] : (uint2)(RS_NO_CHUNK, 0);
-  const int px = group_x + lane % RS_GROUP_WIDTH;
-  const int py = group_y + lane / RS_GROUP_WIDTH;
-  const size_t plane = (size_t)width * height;
+                                    const int group_y) {
+  const uint2 tail = works
+                         ? scene.stream_ends[rs_group_number(scene.camera->width, group_x, group_y)]
+                         : (uint2)(RS_NO_CHUNK, 0);
   Pixels p;
-  load_pixels(&p, camera, tangents, image_gradient, depth_gradient, screen_x, screen_y, px, py);
-  const float T = rs_load_pixels(transmittances, width, height, px, py);
-  const float T_last = rs_load_pixels(transmittances + plane, width, height, px, py);
-  const float sky = background.x * p.gR + background.y * p.gG + background.z * p.gB;
+  load_pixels(&p, scene, group_x + lane % RS_GROUP_WIDTH, group_y + lane / RS_GROUP_WIDTH);
   OwnBackwardRows own;
   ClosedHit closed = {0.0f, 0.0f};
   RowSet open = 0;  // slots that are taken, a bit each
@@ -179,11 +157,10 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
       }
       open &= ~closing;
       for (; closing != 0; closing &= closing - 1)
-        close_row(memory, &own, lane, rs_first_slot(closing), &p, T, T_last, sky, lines, sums,
-                  &closed);
-      const uint2 row = pool[first + n];
-      const float before = pool_transmittance[(first + n) * GROUP + lane];
-      __global const float* v = lines[row.x >> 1].v;
+        close_row(memory, &own, lane, rs_first_slot(closing), &p, scene, &closed);
+      const uint2 row = scene.pool[first + n];
+      const float before = scene.pool_transmittance[(first + n) * GROUP + lane];
+      __global const float* v = scene.lines[row.x >> 1].v;
       const PacketMeeting m = rs_meet(v, row.x & 1, 0.0f, p.X, p.Y);
       const float mine = before * group_alpha(v, &m) * rs_projected(&p, v, &m);
       ClosedHit next = closed;  // the nearest behind this one
@@ -218,34 +195,26 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
       }
       rs_group_barrier();
     }
-    chunk = pool[first].x;
+    chunk = scene.pool[first].x;
     used = CHUNK;
   }
   for (; open != 0; open &= open - 1)
-    close_row(memory, &own, lane, rs_first_slot(open), &p, T, T_last, sky, lines, sums, &closed);
+    close_row(memory, &own, lane, rs_first_slot(open), &p, scene, &closed);
 }
 
-RS_GROUP_KERNEL __kernel void trace_backward_group(RS_VIEW_ARGUMENTS,
-                                                   const RsBackward backward_argument,
-                                                   RS_STREAM_ARGUMENTS(const),
-                                                   __global const RsLine* restrict lines,
-                                                   __global const float* restrict image_gradient,
-                                                   __global const float* restrict depth_gradient,
-                                                   __global float* restrict gradients) {
+RS_GROUP_KERNEL __kernel void trace_backward_group(RS_BACKWARD_ARGUMENTS) {
   __local BackwardMemory memory;
   const RsCamera camera = camera_argument;
   const RsBackward backward = backward_argument;
   const uint tiles_x = backward.tiles_x, tile_row = backward.tile_row;
-  const float4 background =
-      (float4)(backward.background[0], backward.background[1], backward.background[2], 0.0f);
   const int lane = rs_group_lane();
-  LineSums sums;
-  sums.lines = gradients;
-  sums.limit = backward.limit;
+  BackwardScene scene =
+      backward_scene(&camera, &backward, tangents, transmittances, stream_ends, pool,
+                     pool_transmittance, lines, image_gradient, depth_gradient, gradients);
 #if PRIVATE_COPIES
   // Tiles are numbered over the whole image, so that the sums do not depend on the bands.
   const uint group = get_group_id(0);
-  sums.lines += (size_t)group * backward.gaussians * 16;
+  scene.sums.lines += (size_t)group * backward.gaussians * 16;
   const uint groups = backward.copies;
   const uint first = tile_row * tiles_x, end = first + backward.tile_rows * tiles_x;
   for (uint tile = first + (group + groups - first % groups) % groups; tile < end; tile += groups) {
@@ -254,9 +223,7 @@ RS_GROUP_KERNEL __kernel void trace_backward_group(RS_VIEW_ARGUMENTS,
     const int y0 = tile / tiles_x * TILE;
     for (int y = y0; y < min(y0 + TILE, camera.height); y += RS_GROUP_HEIGHT) {
       for (int x = x0; x < min(x0 + TILE, camera.width); x += RS_GROUP_WIDTH) {
-        group_backward(&memory, lane, works, &camera, tangents, x, y, lines, image_gradient,
-                       depth_gradient, transmittances, stream_ends, pool, pool_transmittance,
-                       background, backward.screen_x, backward.screen_y, &sums);
+        group_backward(&memory, lane, works, scene, x, y);
       }
     }
   }
@@ -265,8 +232,6 @@ RS_GROUP_KERNEL __kernel void trace_backward_group(RS_VIEW_ARGUMENTS,
   const int y = (int)get_global_id(1) * RS_GROUP_HEIGHT + tile_row * TILE;
   const bool works = x < camera.width && y < camera.height &&
                      rs_on_face(tiles, face, y / TILE * tiles_x + x / TILE);
-  group_backward(&memory, lane, works, &camera, tangents, x, y, lines, image_gradient,
-                 depth_gradient, transmittances, stream_ends, pool, pool_transmittance, background,
-                 backward.screen_x, backward.screen_y, &sums);
+  group_backward(&memory, lane, works, scene, x, y);
 #endif
 }

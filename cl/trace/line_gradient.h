@@ -3,56 +3,7 @@
 #ifndef RS_TRACE_LINE_GRADIENT_H
 #define RS_TRACE_LINE_GRADIENT_H
 
-#include "trace/packet.h"
-
-// Depth has a gradient too. The depth of a hit is that of its greatest response, and so depends on
-// m_z; its gradient takes the slot of D0, whose own follows from the others (view_gradient.h).
-#ifndef DEPTH_GRADIENT
-#define DEPTH_GRADIENT 0
-#endif
-
-// What the rays of a packet share, and the gradient of its pixels.
-typedef struct {
-  fv X, Y;
-  fv gR, gG, gB, gA;
-#if DEPTH_GRADIENT
-  fv gS;  // of the sum of T alpha t
-#endif
-  float screen_x, screen_y;
-} Pixels;
-
-// Loads what the pixels of the packet at (px, py) bring to the backward pass, its tangent
-// coordinates as well.
-void load_pixels(Pixels* p,
-                 const RsCamera* camera,
-                 __global const float* restrict tangents,
-                 __global const float* restrict image_gradient,
-                 __global const float* restrict depth_gradient,
-                 const float screen_x,
-                 const float screen_y,
-                 const int px,
-                 const int py) {
-  const int width = camera->width, height = camera->height;
-  const size_t plane = (size_t)width * height;
-  const PacketRays rays = rs_packet_rays(camera, tangents, px, py);
-  p->X = rays.X;
-  p->Y = rays.Y;
-  p->screen_x = screen_x;
-  p->screen_y = screen_y;
-  p->gR = rs_load_pixels(image_gradient, width, height, px, py);
-  p->gG = rs_load_pixels(image_gradient + plane, width, height, px, py);
-  p->gB = rs_load_pixels(image_gradient + 2 * plane, width, height, px, py);
-  // Alpha is a fourth colour channel that is 1 in every Gaussian and 0 in the background.
-  p->gA = rs_load_pixels(image_gradient + 3 * plane, width, height, px, py);
-#if DEPTH_GRADIENT
-  p->gS = rs_load_pixels(depth_gradient, width, height, px, py);
-#if LENS == RS_LENS_AROUND
-  p->gS *= sqrt(1.0f + p->X * p->X + p->Y * p->Y);  // depths lie along the rays
-#endif
-#else
-  (void)depth_gradient;
-#endif
-}
+#include "trace/backward_scene.h"
 
 // What a pixel gains from each unit of T alpha that a Gaussian blends.
 fv rs_projected(const Pixels* p, __global const float* v, const PacketMeeting* m) {
