@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One pass of a stable LSD radix sort on 8 bits (Zagha and Blelloch 1991): count_digits, an
-// exclusive scan of the table counts[digit][group], scatter. O(n) work, 3 reads and 2 writes of an
+// One pass of a stable LSD radix sort on 8 bits (Zagha and Blelloch 1991): count_digits,
+// scan_counts of the table counts[digit][group], scatter. O(n) work, 3 reads and 2 writes of an
 // element per pass. Between the passes key and value lie side by side (uint2): half as many places
 // are written at once, so that the lines being filled stay in the first cache.
 // The elements are the first min(live[0], most): the host may know only how many there are at most.
@@ -101,6 +101,38 @@ __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void count_digits(
 #endif
 }
 
+// Each of a digit's counts becomes the sum of those of the groups before, and totals[digit] that of
+// all. Launch: a work-group per digit, or one of one work-item.
+__kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void scan_counts(__global uint* counts,
+                                                                             __global uint* totals,
+                                                                             uint groups) {
+#if GROUP > 1
+  __local uint scratch[RS_SCAN_WORDS];
+  const uint lane = get_local_id(0);
+  __global uint* row = counts + get_group_id(0) * groups;
+  uint running = 0;
+  for (uint base = 0; base < groups; base += GROUP) {
+    const uint i = base + lane;
+    uint total;
+    const uint before = group_scan(i < groups ? row[i] : 0, scratch, &total);
+    if (i < groups) row[i] = running + before;
+    running += total;
+  }
+  if (lane == 0) totals[get_group_id(0)] = running;
+#else
+  for (uint d = 0; d < RS_DIGITS; ++d) {
+    __global uint* row = counts + d * groups;
+    uint running = 0;
+    for (uint g = 0; g < groups; ++g) {
+      const uint count = row[g];
+      row[g] = running;
+      running += count;
+    }
+    totals[d] = running;
+  }
+#endif
+}
+
 #if GROUP > RS_DIGITS
 #error "GROUP is at most 256"
 #elif GROUP > 1
@@ -161,13 +193,14 @@ void find_starts(__local uint* counts, __local uint* scratch) {
 }
 #endif
 
-// `offsets` is the scanned table of count_digits, launched with the same groups and numbers,
-// with the total behind it.
+// `counts` and `totals` are those of scan_counts; launched with the groups and numbers of
+// count_digits.
 __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void scatter(
     RS_EITHER __global const uint* keys,
     RS_EITHER __global const uint* values,
     RS_EITHER __global const uint2* pairs,
-    __global const uint* offsets,
+    __global const uint* counts,
+    __global const uint* totals,
     RS_EITHER __global uint* keys_out,
     RS_EITHER __global uint* values_out,
     RS_EITHER __global uint2* pairs_out,
@@ -187,7 +220,13 @@ __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void scatter(
   __local uint next[RS_DIGITS];   // where the group's next element of a digit goes
   __local uint scratch[RS_SCAN_WORDS];
   const uint lane = get_local_id(0);
-  for (uint d = lane; d < RS_DIGITS; d += GROUP) next[d] = offsets[d * groups + group];
+  uint sum = 0, all;
+  for (uint d = lane * RS_SHARE; d < (lane + 1) * RS_SHARE; ++d) sum += totals[d];
+  uint digit_start = group_scan(sum, scratch, &all);
+  for (uint d = lane * RS_SHARE; d < (lane + 1) * RS_SHARE; ++d) {
+    next[d] = digit_start + counts[d * groups + group];
+    digit_start += totals[d];
+  }
   for (uint base = begin; base < end; base += RS_TILE) {
     const uint size = min((uint)RS_TILE, end - base);
     for (uint d = lane; d < RS_DIGITS; d += GROUP) {
@@ -232,8 +271,7 @@ __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void scatter(
   }
 #else
   if (begin >= end) return;
-  const uint first = RS_DIGIT(RS_KEY(begin), shift);
-  if (offsets[first * groups] == 0 && offsets[(first + 1) * groups] == count) {
+  if (totals[RS_DIGIT(RS_KEY(begin), shift)] == count) {
     // Every key has this digit: nothing moves.
     for (uint i = begin; i < end; ++i) {
       RS_STORE(RS_ELEMENT(i), i);
@@ -241,7 +279,11 @@ __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void scatter(
     return;
   }
   uint next[RS_DIGITS];
-  for (uint d = 0; d < RS_DIGITS; ++d) next[d] = offsets[d * groups + group];
+  uint digit_start = 0;
+  for (uint d = 0; d < RS_DIGITS; ++d) {
+    next[d] = digit_start + counts[d * groups + group];
+    digit_start += totals[d];
+  }
   for (uint i = begin; i < end; ++i) {
     const uint2 element = RS_ELEMENT(i);
     const uint target = next[RS_DIGIT(element.x, shift)]++;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exclusive prefix sum, reduce-then-scan (Merrill and Grimshaw 2009): sum_chunks, scan_values over
-// the sums with one group, scan_values over the values. Launch: work-groups of GROUP work-items
-// (a power of two), each walks `chunk` consecutive elements. GROUP = 1 is the CPU's form: few
-// long sequential loops. Sums stop at 2^32 - 1, so that a caller can tell. Reads 2 n and writes n
-// elements.
+// Exclusive prefix sum, reduce-then-scan (Merrill and Grimshaw 2009): sum_chunks, then scan_values,
+// each group of which adds up the sums of the chunks before its own: they are few, and a launch for
+// them would take longer. Launch: work-groups of GROUP work-items (a power of two), each walks
+// `chunk` consecutive elements. GROUP = 1 is the CPU's form: few long sequential loops. Sums stop
+// at 2^32 - 1, so that a caller can tell. Reads 2 n and writes n elements.
 #include "parallel/group_scan.h"
 
 // sums[g] = sum of the elements of group g's chunk.
@@ -22,17 +22,20 @@ __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void sum_chunks(
   if (get_local_id(0) == 0) sums[get_group_id(0)] = sum;
 }
 
-// Scans the values in place; bases[g] is what the chunks before g sum to (ignored where there is
-// one group). The last group writes the total behind the values.
+// Scans the values in place; `sums` are those of sum_chunks (not read where there is one group).
+// The last group writes the total behind the values.
 __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void scan_values(
-    __global uint* values, __global const uint* bases, uint count, uint chunk) {
+    __global uint* values, __global const uint* sums, uint count, uint chunk) {
   const uint group = get_group_id(0);
   const uint begin = min(group * chunk, count);
   const uint end = min(begin + chunk, count);
-  uint running = get_num_groups(0) > 1 ? bases[group] : 0;
+  uint running = 0;
 #if GROUP > 1
   __local uint scratch[RS_SCAN_WORDS];
   const uint lane = get_local_id(0);
+  uint mine = 0;
+  for (uint g = lane; g < group; g += GROUP) mine = add_sat(mine, sums[g]);
+  group_scan(mine, scratch, &running);
   for (uint base = begin; base < end; base += GROUP) {
     const uint i = base + lane;
     uint total;
@@ -41,6 +44,7 @@ __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void scan_values(
     running = add_sat(running, total);
   }
 #else
+  for (uint g = 0; g < group; ++g) running = add_sat(running, sums[g]);
   for (uint i = begin; i < end; ++i) {
     const uint value = values[i];
     values[i] = running;

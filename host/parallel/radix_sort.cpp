@@ -18,7 +18,7 @@ RadixSort::RadixSort(Context& context)
     : RadixSort(context, ChunkShape::for_device(context.device())) {}
 
 RadixSort::RadixSort(Context& context, const ChunkShape& shape)
-    : context_(&context), shape_(shape), scan_(context, shape), all_(context, 1, "all to sort") {
+    : context_(&context), shape_(shape), all_(context, 1, "all to sort") {
   all_.fill(0xffffffffu);
 }
 
@@ -33,6 +33,7 @@ void RadixSort::require_kernels(bool from_pairs, bool to_pairs) {
   scatter = context_->kernel(kProgram, "scatter", options);
   Kernel& count_digits = count_digits_[from_pairs];
   if (!count_digits) count_digits = context_->kernel(kProgram, "count_digits", options);
+  if (!scan_counts_) scan_counts_ = context_->kernel(kProgram, "scan_counts", options);
 }
 
 void RadixSort::begin_programs(int bits) {
@@ -90,10 +91,14 @@ void RadixSort::pass(const Ends& ends,
   const auto least = static_cast<std::uint32_t>(shape_.min_chunk);
   const auto shift = static_cast<std::uint32_t>(bit);
   const Range range = Range::linear(groups * shape_.group_size, shape_.group_size);
-  table_.ensure(*context_, kDigits * groups + 1, "sort digit table");
-  count_digits_[from_pairs].launch(range, ends.keys, ends.pairs, table_, live, limit, least, shift);
-  scan_.exclusive(table_, kDigits * groups);
-  scatter_[from_pairs][to_pairs].launch(range, ends.keys, ends.values, ends.pairs, table_,
+  counts_.ensure(*context_, kDigits * groups, "sort digit counts");
+  totals_.ensure(*context_, kDigits, "sort digit totals");
+  count_digits_[from_pairs].launch(range, ends.keys, ends.pairs, counts_, live, limit, least,
+                                   shift);
+  const std::size_t scans = shape_.group_size > 1 ? kDigits : 1;
+  scan_counts_.launch(Range::linear(scans * shape_.group_size, shape_.group_size), counts_, totals_,
+                      static_cast<std::uint32_t>(groups));
+  scatter_[from_pairs][to_pairs].launch(range, ends.keys, ends.values, ends.pairs, counts_, totals_,
                                         ends.keys_out, ends.values_out, ends.pairs_out, live, limit,
                                         least, shift);
 }

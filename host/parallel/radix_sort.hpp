@@ -8,7 +8,6 @@
 #include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "parallel/chunk_shape.hpp"
-#include "parallel/scan.hpp"
 
 namespace raysplats {
 
@@ -60,14 +59,15 @@ class RadixSort {
 
   Context* context_;
   ChunkShape shape_;
-  Scan scan_;
-  Kernel count_digits_[2];     // of keys, of pairs
+  Kernel count_digits_[2];  // of keys, of pairs
+  Kernel scan_counts_;
   Kernel scatter_[2][2];       // from keys and values or from pairs, to the same
   Buffer<std::uint32_t> all_;  // more than there can be
   Buffer<Pair> pairs_[2];
   Buffer<std::uint32_t> keys_;
   Buffer<std::uint32_t> values_;
-  Buffer<std::uint32_t> table_;
+  Buffer<std::uint32_t> counts_;  // of digits, by work-group
+  Buffer<std::uint32_t> totals_;
 };
 
 }  // namespace raysplats

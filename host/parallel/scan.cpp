@@ -31,15 +31,9 @@ void Scan::exclusive(Buffer<std::uint32_t>& values, std::size_t count) {
   const std::size_t groups = shape_.used_groups(count);
   const auto n = static_cast<std::uint32_t>(count);
   const auto step = static_cast<std::uint32_t>(chunk);
-  sums_.ensure(*context_, groups + 1, "scan sums");
+  sums_.ensure(*context_, groups, "scan sums");
   const Range range = Range::linear(groups * shape_.group_size, shape_.group_size);
-  if (groups > 1) {
-    sum_chunks_.launch(range, values, sums_, n, step);
-    // There are few sums: one group walks them all. With one group the bases are not read.
-    const auto sums = static_cast<std::uint32_t>(groups);
-    scan_values_.launch(Range::linear(shape_.group_size, shape_.group_size), sums_, sums_, sums,
-                        sums);
-  }
+  if (groups > 1) sum_chunks_.launch(range, values, sums_, n, step);
   scan_values_.launch(range, values, sums_, n, step);
 }
 

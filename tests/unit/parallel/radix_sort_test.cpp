@@ -91,7 +91,7 @@ TEST_CASE("radix sort: part of a buffer and part of the bits") {
 TEST_CASE("radix sort: every division of the work gives the same result") {
   Context context(test_device());
   for (const std::size_t size : {1u, 64u, 256u}) {
-    for (const std::size_t groups : {1u, 2u, 3u, 8u, 100u}) {
+    for (const std::size_t groups : {1u, 2u, 3u, 8u, 100u, 300u}) {
       CAPTURE(size);
       CAPTURE(groups);
       RadixSort sorter(context, ChunkShape{groups, size, 1});
