@@ -6,7 +6,7 @@ namespace raysplats {
 
 const std::vector<CompiledKernel>& compiled_kernels() {
   static const std::vector<CompiledKernel> all{
-      {"gfx1100", "sort pairs: scatter", 43, 15424, 256, 32},
+      {"gfx1100", "sort pairs: scatter", 42, 15424, 256, 32},
       {"gfx1100", "prepare sh0: prepare_view", 58, 4096, 64, 32},
       {"gfx1100", "lists: fill_tiles", 52, 0, 64, 32},
       {"gfx1100", "group forward render: trace_forward_group", 41, 7952, 32, 32},
@@ -33,7 +33,7 @@ const std::vector<CompiledKernel>& compiled_kernels() {
       {"sm_86", "lists: fill_tiles", 56, 0, 64, 32},
       {"sm_86", "group forward render: trace_forward_group", 55, 7952, 32, 32},
       {"sm_86", "group forward train: trace_forward_group", 56, 7960, 32, 32},
-      {"sm_86", "group backward atomic: trace_backward_group", 61, 7712, 32, 32},
+      {"sm_86", "group backward atomic: trace_backward_group", 59, 7712, 32, 32},
       {"sm_86", "finalize group sh3: finalize_group", 64, 4096, 64, 32},
       {"sm_86", "loss group: group_ssim_derivatives", 60, 12064, 256, 32},
       {"sm_86", "loss group: group_gradient", 40, 13104, 256, 32},
