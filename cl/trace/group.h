@@ -98,12 +98,13 @@ void rs_row_set(
 #endif
 
 #if SUBGROUP
-#define rs_group_barrier() sub_group_barrier(CLK_LOCAL_MEM_FENCE)
+#define RS_GROUP_BARRIER(fence) sub_group_barrier(fence)
 #define rs_group_lane() ((int)get_sub_group_local_id())
 #else
-#define rs_group_barrier() barrier(CLK_LOCAL_MEM_FENCE)
+#define RS_GROUP_BARRIER(fence) barrier(fence)
 #define rs_group_lane() ((int)get_local_id(0))
 #endif
+#define rs_group_barrier() RS_GROUP_BARRIER(CLK_LOCAL_MEM_FENCE)
 
 // One bit per work-item whose flag is set, work-item 0 lowest. `words`: two words of local memory,
 // which subgroups leave alone.

@@ -177,7 +177,7 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   direction_gradient(&color, along, out.mean);
 #endif
   rs_sh_basis(SH_DEGREE, color.n[0], color.n[1], color.n[2], color.basis);
-  barrier(CLK_LOCAL_MEM_FENCE);
+  barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE);  // other work-items have summed the copies
   staged.present[lane] = stored;
   __global float* sh_gradient = g_sh + first * 3 * SH_COEFFICIENTS;
   store_sh_gradient(0, color.basis, color.value, touched, &staged, sh_gradient);

@@ -82,6 +82,7 @@ RS_GROUP_KERNEL __kernel void trace_forward_group(RS_LIST_ARGUMENTS,
                           (row + forward.window[1]) * picture_tiles_x + column + forward.window[0]);
 #if CROWDED
   works = works && opacities[(size_t)group_y * camera.width + group_x] == RS_LEFT;
+  RS_GROUP_BARRIER(CLK_GLOBAL_MEM_FENCE);  // work-item 0 writes there at the end
 #endif
 
   const int px = group_x + lane % RS_GROUP_WIDTH;

@@ -111,6 +111,9 @@ RS_GROUP_INLINE void group_list_batch(__local ForwardMemory* memory,
     if (hit.hit && hit.alpha > 0.0f && place_before(list->last, place))
       list_insert(list, scene, place, k, hit.alpha);
   }
+#if SUBGROUP
+  rs_group_barrier();  // groups meet one before the queue is written again
+#endif
 }
 
 // Whether the nearest hit of the list can be blended: nothing that comes later in the candidates is

@@ -108,19 +108,21 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
   // No ray meets a Gaussian twice.
   pass.limit = GradientSums::limit(packet_count() * static_cast<std::size_t>(packet().lanes));
   const bool shared = !sums.is_private();
-  in_bands(context, backward_budget, rows, [&](std::uint32_t first, std::uint32_t number) {
-    // Shared sums find their rows by the offset of the launch.
-    pass.tile_row = shared ? row : row + first;
-    pass.tile_rows = number;
-    for (Kernel& kernel : launched) {
+  // All bands of a kernel before the next one: private sums keep that order whatever the bands.
+  for (std::size_t k = 0; k < launched.size(); ++k) {
+    Kernel& kernel = launched[k];
+    in_bands(context, backward_budgets[k], rows, [&](std::uint32_t first, std::uint32_t number) {
+      // Shared sums find their rows by the offset of the launch.
+      pass.tile_row = shared ? row : row + first;
+      pass.tile_rows = number;
       const Range range =
           shared ? kernels.range(kernel, 1, camera.width, {lists.tiles_x(), first, number})
                  : Range{{sums.copies() * kernels.items(), 1, 1}, {kernels.items(), 1, 1}, {}};
       kernel.launch(range, view_arguments(), pass, streams.arguments(), lists.lines(),
                     image_gradient, depth_gradient != nullptr ? *depth_gradient : no_depth_gradient,
                     sums.target());
-    }
-  });
+    });
+  }
 }
 
 GaussianKernel CameraTracer::Impl::finalize_kernel(

@@ -106,7 +106,7 @@ struct CameraTracer::Impl {
   Buffer<float> no_tangents;
   Buffer<float> no_depth_gradient;
   LaunchBudget forward_budget;
-  LaunchBudget backward_budget;
+  std::array<LaunchBudget, 2> backward_budgets;  // of the first launch and of the second
   LaunchBudget watched_budget;  // of launches that somebody watches, where no other bounds them
   std::function<void(double)> watch;
   std::size_t watched_tiles = 0;  // of this forward() that are done

@@ -3,6 +3,7 @@
 
 #include <doctest/doctest.h>
 
+#include <array>
 #include <cstdint>
 #include <initializer_list>
 #include <utility>
@@ -169,6 +170,17 @@ TEST_CASE("packet shape: a tuning with subgroups and one without are two shapes"
   CHECK_FALSE(packet_layout(gpu, width_of(0)).subgroups);
   CHECK(packet_layout(gpu, width_of(0)).lanes == 16);
   CHECK(packet_layout(gpu, width_of(0, PacketShape::kSubgroup)).lanes == 32);
+}
+
+// In the forward and in the backward pass, eight at a time, of 64.
+TEST_CASE("packet shape: open rows of crowded packets fit local memory") {
+  const auto rows = [](std::uint64_t kib, int lanes) {
+    return packet_layout(gpu_of(1024 * kib), width_of(lanes, PacketShape::kGroup)).crowded_rows;
+  };
+  CHECK(rows(16, 32) == std::array<int, 2>{24, 40});
+  CHECK(rows(16, 64) == std::array<int, 2>{8, 16});
+  CHECK(rows(48, 64) == std::array<int, 2>{56, 64});
+  CHECK(rows(32, 32) == std::array<int, 2>{64, 64});
 }
 
 TEST_CASE("packet group: within the limits of the kernel and the tuning") {
