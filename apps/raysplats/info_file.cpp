@@ -46,7 +46,6 @@ Json describe_path(const std::filesystem::path& path) {
 Json describe_views(const std::filesystem::path& path) {
   Json out{{"type", "cameras of viewers"}};
   out.update(describe_cameras(io::read_listed_views(path)));
-  out.erase("camera_models");
   return out;
 }
 

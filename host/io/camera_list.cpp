@@ -15,10 +15,11 @@
 #include "io/byte_reader.hpp"
 #include "io/data_origin.hpp"
 #include "io/json_file.hpp"
+#include "io/transforms.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "scene/camera_check.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/photo_lens.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -62,39 +63,62 @@ std::optional<glm::dmat3> rotation_of(const Json& rows) {
   return out;
 }
 
-std::optional<Camera> camera_of(const Json& view) {
+/// Nothing for what is no view. Throws DataError for a lens that cannot be read.
+std::optional<Camera> camera_of(const Json& view,
+                                const std::filesystem::path& path,
+                                std::size_t number) {
   if (!view.is_object()) return std::nullopt;
   const std::optional<glm::dvec3> center = triple(view.value("position", Json()));
   const std::optional<glm::dmat3> rotation = rotation_of(view.value("rotation", Json()));
   const std::optional<int> width = side(view, "width");
   const std::optional<int> height = side(view, "height");
   if (!center || !rotation || !width || !height) return std::nullopt;
-  Camera camera;
+  const std::string where = fmt::format("entry {}", number);
+  TransformsFrame frame = stated_intrinsics(view, path, where);
+  frame.number = number;
+  frame.width = width;
+  frame.height = height;
+  frame.fx = focal(view, "fx");
+  frame.fy = focal(view, "fy");
+  if (!(*frame.fx > 0.0 && *frame.fy > 0.0)) {
+    // Lists that name no models have panoramas without focal lengths.
+    if (!view.contains("camera_model")) frame.model = CameraModel::kEquirectangular;
+    if (frame.model != CameraModel::kEquirectangular) {
+      throw DataError(fmt::format("{}, {}: its camera_model needs 'fx' and 'fy' above 0",
+                                  path.string(), where));
+    }
+  }
+  frame.rotation = *rotation;
+  frame.translation = -(*rotation * *center);
+  TransformsFile file;
+  file.path = path;
+  file.frames = {std::move(frame)};
+  Camera camera = rendered_camera(frame_camera(file, 0, *width, *height));
   const Json name = view.value("img_name", Json());
   if (name.is_string()) camera.name = name.get<std::string>();
-  camera.width = *width;
-  camera.height = *height;
-  camera.fx = focal(view, "fx");
-  camera.fy = focal(view, "fy");
-  camera.cx = 0.5 * *width;
-  camera.cy = 0.5 * *height;
-  if (!(camera.fx > 0.0 && camera.fy > 0.0)) set_equirectangular(camera);
-  camera.rotation = *rotation;
-  camera.translation = -(*rotation * *center);
   return camera;
 }
 
-}  // namespace
-
-std::vector<std::optional<Camera>> read_camera_list(const std::filesystem::path& path) {
+Json entries_of(const std::filesystem::path& path) {
   // The file is a list; the reader of bounded depth takes objects.
   const std::vector<std::byte> bytes = read_file(path);
   const std::string text =
       "{\"cameras\":" + std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()) +
       "}";
-  const Json json = parse_json_object(std::as_bytes(std::span(text)), path);
+  return parse_json_object(std::as_bytes(std::span(text)), path).at("cameras");
+}
+
+}  // namespace
+
+std::vector<std::optional<Camera>> read_camera_list(const std::filesystem::path& path) {
   std::vector<std::optional<Camera>> out;
-  for (const Json& view : json.at("cameras")) out.push_back(camera_of(view));
+  for (const Json& view : entries_of(path)) {
+    try {
+      out.push_back(camera_of(view, path, out.size()));
+    } catch (const DataError&) {
+      out.push_back(std::nullopt);
+    }
+  }
   return out;
 }
 
@@ -106,7 +130,8 @@ bool is_camera_list(const std::filesystem::path& path) {
 
 std::vector<Camera> read_listed_views(const std::filesystem::path& path) {
   std::vector<Camera> out;
-  for (std::optional<Camera>& camera : read_camera_list(path)) {
+  for (const Json& view : entries_of(path)) {
+    std::optional<Camera> camera = camera_of(view, path, out.size());
     if (!camera) {
       throw DataError(
           fmt::format("{}: entry {} is no view with position, rotation, width and height",

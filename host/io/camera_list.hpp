@@ -10,9 +10,10 @@
 namespace raysplats::io {
 
 /// The cameras of a cameras.json as RunFolder::write_cameras() and other trainers of 3DGS write it:
-/// pinholes that look through the middle of their pictures, since it says neither lens nor centre,
-/// and panoramas, which have no focal lengths. Nothing for entries that are no view with position,
-/// rotation, width and height. Throws DataError for a file that is no JSON.
+/// principal point and lens by the keys of a transforms.json. Without these keys, as others write
+/// it, they are pinholes that look through the middle of their pictures, or panoramas where there
+/// are no focal lengths. Nothing for entries that are no view with position, rotation, width and
+/// height, or whose lens cannot be read. Throws DataError for a file that is no JSON.
 std::vector<std::optional<Camera>> read_camera_list(const std::filesystem::path& path);
 
 /// Whether a file begins as a JSON list, as cameras.json does and a transforms.json does not; not

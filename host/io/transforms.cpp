@@ -170,6 +170,13 @@ void read_intrinsics(const Scope& scope, TransformsFrame& frame) {
   if (const auto radius = scope.positive("fisheye_crop_radius")) frame.crop_radius = radius;
 }
 
+/// Those of one camera, over what the file says of all.
+void read_own_intrinsics(const Scope& scope, TransformsFrame& frame) {
+  read_intrinsics(scope, frame);
+  if (frame.model == CameraModel::kPhotoLens && frame.fisheye624.empty())
+    scope.fail("FISHEYE624 needs the twelve numbers of 'distortion_params'");
+}
+
 /// The signs that make the columns of the file's matrices right, down and forward. As a rule these
 /// are right, up and backward, as OpenGL has them.
 glm::dvec3 axis_signs(const json& root, const fs::path& path) {
@@ -280,6 +287,14 @@ std::optional<std::vector<std::string>> read_names(const Scope& scope, const cha
 
 }  // namespace
 
+TransformsFrame stated_intrinsics(const json& object,
+                                  const fs::path& path,
+                                  const std::string& where) {
+  TransformsFrame frame;
+  read_own_intrinsics({object, path, where}, frame);
+  return frame;
+}
+
 TransformsFile read_transforms(const fs::path& path) {
   return parse_transforms(read_json_object(path), path);
 }
@@ -305,9 +320,7 @@ TransformsFile parse_transforms(const json& root, const fs::path& path) {
     if (!object.is_object()) frame_scope.fail("it is no JSON object");
     TransformsFrame frame = common;
     frame.number = file.frames.size();
-    read_intrinsics(frame_scope, frame);
-    if (frame.model == CameraModel::kPhotoLens && frame.fisheye624.empty())
-      frame_scope.fail("FISHEYE624 needs the twelve numbers of 'distortion_params'");
+    read_own_intrinsics(frame_scope, frame);
     scaled += read_pose(frame_scope, signs, frame) ? 1 : 0;
     frame.file_path = portable_path(frame_scope.text("file_path"));
     frame.mask_path = portable_path(frame_scope.text("mask_path"));
@@ -397,6 +410,17 @@ Camera frame_camera(const TransformsFile& file, std::size_t index, int width, in
   return camera;
 }
 
+json lens_keys(const Camera& camera) {
+  json out{{"camera_model", model_name(camera.model)}, {"cx", camera.cx}, {"cy", camera.cy}};
+  const Distortion& d = camera.distortion;
+  const bool fisheye = camera.model == CameraModel::kFisheye;
+  if (fisheye || camera.model == CameraModel::kOpenCv) {
+    out.update({{"k1", d.k1}, {"k2", d.k2}, {"k3", d.k3}});
+    out.update(fisheye ? json{{"k4", d.k4}} : json{{"p1", d.p1}, {"p2", d.p2}});
+  }
+  return out;
+}
+
 std::string inner_name(const fs::path& path) {
   fs::path name;
   for (const fs::path& part : path.lexically_normal().relative_path()) {
@@ -447,20 +471,9 @@ void write_cameras(const std::filesystem::path& path, const std::vector<Camera>&
   for (const Camera& camera : written) cameras.push_back(rendered_camera(camera));
   const auto intrinsics = [](Camera camera) {
     if (camera.model == CameraModel::kEquirectangular) set_equirectangular(camera);
-    nlohmann::json out{{"camera_model", io::model_name(camera.model)},
-                       {"w", camera.width},
-                       {"h", camera.height},
-                       {"fl_x", camera.fx},
-                       {"fl_y", camera.fy},
-                       {"cx", camera.cx},
-                       {"cy", camera.cy}};
-    const Distortion& d = camera.distortion;
-    const bool fisheye = camera.model == CameraModel::kFisheye;
-    if (fisheye || camera.model == CameraModel::kOpenCv) {
-      out.update({{"k1", d.k1}, {"k2", d.k2}, {"k3", d.k3}});
-      out.update(fisheye ? nlohmann::json{{"k4", d.k4}}
-                         : nlohmann::json{{"p1", d.p1}, {"p2", d.p2}});
-    }
+    nlohmann::json out = io::lens_keys(camera);
+    out.update(
+        {{"w", camera.width}, {"h", camera.height}, {"fl_x", camera.fx}, {"fl_y", camera.fy}});
     return out;
   };
   nlohmann::json root{{"frames", nlohmann::json::array()}};

@@ -56,6 +56,16 @@ TransformsFile parse_transforms(const nlohmann::json& root, const std::filesyste
 /// Throws DataError when the frame has no focal length or angle (equirectangular frames need none).
 Camera frame_camera(const TransformsFile& file, std::size_t frame, int width, int height);
 
+/// What an object of another kind of file says of a camera by the keys of a frame; no pose and no
+/// names. `where` says in errors, beside the path, whose it is. Throws as read_transforms() does.
+TransformsFrame stated_intrinsics(const nlohmann::json& object,
+                                  const std::filesystem::path& path,
+                                  const std::string& where);
+
+/// The keys that tell a camera's model, principal point and distortion; those of kPhotoLens, which
+/// no file of ours has, do not tell all.
+nlohmann::json lens_keys(const Camera& camera);
+
 /// A name without root, "." and ".." components, so that files named after it stay inside their
 /// folder.
 std::string inner_name(const std::filesystem::path& path);

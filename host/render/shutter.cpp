@@ -30,7 +30,8 @@ Camera camera_between(std::span<const Camera> cameras,
   if (share == 0.0 || cameras.size() < 2) return now;
   if (frame + 1 < cameras.size()) return between(now, cameras[frame + 1], share);
   if (closed) return between(now, cameras.front(), share);
-  return between(cameras[frame - 1], now, 1.0 + share);
+  // On as it came.
+  return between(now, cameras[frame - 1], -share);
 }
 
 void add(Image& sum, Image image) {
@@ -38,6 +39,8 @@ void add(Image& sum, Image image) {
     sum = std::move(image);
     return;
   }
+  if (image.width != sum.width || image.height != sum.height || image.channels != sum.channels)
+    throw Error(ErrorCode::kRuntime, "Moments of a frame are pictures of different sizes");
   for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += image.data[i];
 }
 

@@ -16,13 +16,14 @@ void check_shutter(const FrameOptions& options);
 /// How far moment `k` of a frame's lies on the way to the next frame.
 double moment(const FrameOptions& options, int k);
 
-/// The camera `share` of the way from a frame to the next one.
+/// The camera of a frame with its pose `share` of the way to the next frame's, as between() has it;
+/// after the last frame it goes on as it came, without zooming.
 Camera camera_between(std::span<const Camera> cameras,
                       std::size_t frame,
                       double share,
                       bool closed);
 
-/// Adds a picture to a sum, which may have none yet.
+/// Adds a picture to a sum, which may have none yet. Throws Error for one of another size.
 void add(Image& sum, Image image);
 /// The mean of that many.
 void divide(Image& sum, int count);

@@ -20,6 +20,7 @@
 
 #include "io/data_origin.hpp"
 #include "io/json_file.hpp"
+#include "io/transforms.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "run/train_config.hpp"
@@ -130,6 +131,7 @@ void RunFolder::write_cameras(std::span<const Camera> cameras) const {
       entry["fy"] = camera.fy;
       entry["fx"] = camera.fx;
     }
+    entry.update(io::lens_keys(camera));
     list.push_back(std::move(entry));
   }
   write_text_file(path_ / "cameras.json", io::json_text(list) + "\n");

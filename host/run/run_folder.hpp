@@ -46,7 +46,8 @@ class RunFolder {
 
   void write_config(const TrainOptions& options) const;
   /// cameras.json as the viewers of 3DGS read it: centre and camera-to-world rotation of every
-  /// view.
+  /// view. They skip its principal point and lens, which are there by the keys of a
+  /// transforms.json.
   void write_cameras(std::span<const Camera> cameras) const;
   /// Writes exposures.json: the 3 x 4 colour matrix of every training photo, by its name. `deltas`
   /// as in Exposure::State.

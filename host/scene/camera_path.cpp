@@ -165,11 +165,17 @@ Camera camera_of(const Keyframe& key, int width, int height) {
 
 Camera between(const Camera& from, const Camera& to, double share) {
   Camera camera = from;
-  const auto mixed = [share](double a, double b) { return a + share * (b - a); };
-  camera.fx = mixed(from.fx, to.fx);
-  camera.fy = mixed(from.fy, to.fy);
-  camera.cx = mixed(from.cx, to.cx);
-  camera.cy = mixed(from.cy, to.cy);
+  // Pixels of pictures of another size, or through another lens, are other measures.
+  if (from.model == to.model && from.width == to.width && from.height == to.height &&
+      from.distortion == to.distortion) {
+    // A zoom that went on would reach focal lengths below 0.
+    const double inside = std::clamp(share, 0.0, 1.0);
+    const auto mixed = [inside](double a, double b) { return a + inside * (b - a); };
+    camera.fx = mixed(from.fx, to.fx);
+    camera.fy = mixed(from.fy, to.fy);
+    camera.cx = mixed(from.cx, to.cx);
+    camera.cy = mixed(from.cy, to.cy);
+  }
   const glm::dvec3 eye = from.center() + share * (to.center() - from.center());
   camera.rotation =
       glm::transpose(turned(glm::transpose(from.rotation), glm::transpose(to.rotation), share));

@@ -36,8 +36,9 @@ std::vector<Keyframe> path_views(const CameraPath& path, int frames);
 Keyframe keyframe_of(const Camera& camera);
 Camera camera_of(const Keyframe& key, int width, int height);
 
-/// The camera a share of the way from `from` to `to`, of the same model and size; beyond 1 it goes
-/// on as before.
+/// `from` with its pose a share of the way to that of `to`; below 0 and beyond 1 the pose goes on
+/// as before. Between cameras of one model, size and distortion focal lengths and principal point
+/// go along from 0 to 1, else they stay.
 Camera between(const Camera& from, const Camera& to, double share);
 
 /// Paths of `frames` views that follow photos, with the lens of the first photo. Throw UsageError

@@ -14,6 +14,7 @@ struct Distortion {
   double k1 = 0, k2 = 0, k3 = 0, p1 = 0, p2 = 0, k4 = 0;
   /// Whether there is any distortion.
   bool any() const { return k1 != 0 || k2 != 0 || k3 != 0 || k4 != 0 || p1 != 0 || p2 != 0; }
+  bool operator==(const Distortion&) const = default;
 };
 
 /// A lens of kPhotoLens; its type is of the library itself.

@@ -88,8 +88,8 @@ void write_image(const std::filesystem::path& path,
                  ColorSpace space = ColorSpace::kUnknown);
 
 /// Cameras of a transforms.json (Blender or nerfstudio keys, file-level or per frame), OpenGL axes
-/// on disk, or of a cameras.json as runs and other trainers of 3DGS write it, which has neither
-/// lenses nor principal points.
+/// on disk, or of a cameras.json as runs and other trainers of 3DGS write it; those of others have
+/// neither lenses nor principal points.
 std::vector<Camera> read_cameras(const std::filesystem::path& path);
 
 /// Writes cameras as a nerfstudio transforms.json that read_cameras() reads back.

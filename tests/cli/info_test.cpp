@@ -154,7 +154,9 @@ TEST_CASE("info describes every kind of file that is read") {
   write_file(folder / "viewer.json",
              "[{\"id\":0,\"width\":8,\"height\":6,\"position\":[0,0,0],\"rotation\":"
              "[[1,0,0],[0,1,0],[0,0,1]]}]");
-  CHECK(json_of(folder / "viewer.json")["type"] == "cameras of viewers");
+  json = json_of(folder / "viewer.json");
+  CHECK(json["type"] == "cameras of viewers");
+  CHECK(json["camera_models"] == nlohmann::json{{"equirectangular", 1}});
   write_file(folder / "metrics.csv", "iteration,psnr\n10,20.5\n20,21\n30,");
   json = json_of(folder / "metrics.csv");
   CHECK(json["type"] == "course of a run");

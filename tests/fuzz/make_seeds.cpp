@@ -152,6 +152,11 @@ void make_transforms(const fs::path& root) {
              R"("val_filenames":[],"test_filenames":["b.png"],"frames":[{"file_path":"a.png",)"
              R"("mask_path":"m.png",)" +
                  matrix + R"(},{"file_path":"b.png","fl_x":9,"w":4,"h":3,)" + matrix + "}]}");
+  corpus.add(
+      "list.json",
+      R"([{"img_name":"a.png","width":8,"height":6,"position":[1,2,3],"rotation":[[1,0,0],[0,1,0],[0,0,1]],
+"fx":7,"fy":7.5,"cx":3,"cy":2.5,"camera_model":"OPENCV_FISHEYE","k1":0.01,"k4":1e-3},
+{"width":8,"height":4,"position":[0,0,4],"rotation":[[1,0,0],[0,1,0],[0,0,1]]}])");
 }
 
 void make_config(const fs::path& root) {

@@ -12,6 +12,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "render/previews.hpp"
+#include "render/shutter.hpp"
 #include "scene/pixel_count.hpp"
 #include "trace/camera_tracer.hpp"
 #include "unit/fixture.hpp"
@@ -94,6 +95,48 @@ TEST_CASE("depth, hits and capped rays of a blurred frame are those of all its m
     CHECK(half[i] == doctest::Approx(0.5f * hits[i]));
   }
   CHECK(blurred.capped_rays == sharp.capped_rays);
+}
+
+TEST_CASE("motion blur leaves still cameras of different sizes and lenses as they are") {
+  const TemporaryDirectory folder;
+  Context context(test_device());
+  Tracer tracer(context, {});
+  const Model model(context, red_balls());
+  const auto still = [](const char* name, int width, int height, double focal) {
+    Camera camera = look_at({0, 0, -4}, {0, 0, 0}, {0, -1, 0}, width, height, focal);
+    camera.name = name;
+    return camera;
+  };
+  const Camera small = still("small.png", 17, 11, 15.0), large = still("large.png", 33, 21, 30.0);
+  Camera fisheye = still("fisheye.png", 33, 21, 12.0);
+  fisheye.model = CameraModel::kFisheye;
+  fisheye.distortion.k1 = 0.05;
+  const std::vector<Camera> pairs[] = {
+      {small, large}, {large, small}, {large, fisheye}, {fisheye, large}};
+  FrameOptions options;
+  options.format = FrameFormat::kExr;
+  options.linear_exr = false;
+  options.shutter = 1.0;
+  for (const std::vector<Camera>& cameras : pairs) {
+    options.shutter_samples = 1;
+    write_frames(tracer, model, cameras, folder.path() / "sharp", options);
+    options.shutter_samples = 2;
+    CHECK(write_frames(tracer, model, cameras, folder.path() / "blurred", options).frames == 2);
+    for (const std::string& name : frame_names(cameras)) {
+      CAPTURE(cameras[0].name);
+      CAPTURE(name);
+      const Image sharp = read_image(folder.path() / "sharp" / (name + ".exr"));
+      const Image blurred = read_image(folder.path() / "blurred" / (name + ".exr"));
+      REQUIRE(blurred.width == sharp.width);
+      REQUIRE(blurred.height == sharp.height);
+      double worst = 0.0;
+      for (std::size_t i = 0; i < sharp.data.size(); ++i)
+        worst = std::max(worst, static_cast<double>(std::abs(blurred.data[i] - sharp.data[i])));
+      CHECK(worst < 1e-3);
+    }
+  }
+  Image sum(17, 11, 4);
+  CHECK_THROWS_AS(add(sum, Image(33, 21, 4)), Error);
 }
 
 TEST_CASE("frames hold what the tracer saw") {

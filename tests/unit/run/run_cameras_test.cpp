@@ -15,6 +15,7 @@
 #include "run/run_folder.hpp"
 #include "scene/camera_model.hpp"
 #include "unit/temporary_directory.hpp"
+#include "unit/text.hpp"
 
 using namespace raysplats;
 namespace fs = std::filesystem;
@@ -61,6 +62,67 @@ TEST_CASE("the cameras of a run come with its model") {
     for (int column = 0; column < 3; ++column)
       CHECK(glm::distance(found[i].rotation[column], cameras[i].rotation[column]) < 1e-9);
   }
+}
+
+TEST_CASE("the cameras of a run keep their principal points and lenses") {
+  const TemporaryDirectory folder;
+  const fs::path run = folder.path() / "run";
+  std::vector<Camera> cameras;
+  for (const CameraModel model :
+       {CameraModel::kPinhole, CameraModel::kOpenCv, CameraModel::kFisheye,
+        CameraModel::kEquirectangular, CameraModel::kOrthographic}) {
+    Camera camera = look_at({0.1, -2, 5}, {0, 0, 0}, {0, 0, 1}, 121, 91, 85);
+    camera.name = "a.png";
+    camera.model = model;
+    camera.fy = 84;
+    camera.cx = 30.1;
+    camera.cy = 20;
+    if (model == CameraModel::kOpenCv) camera.distortion = {0.1, 0.02, 0.003, 0.004, 0.005, 0};
+    if (model == CameraModel::kFisheye) camera.distortion = {0.1, 0.02, 0.003, 0, 0, 0.0006};
+    if (model == CameraModel::kEquirectangular) set_equirectangular(camera);
+    cameras.push_back(camera);
+  }
+  RunFolder(run).write_cameras(cameras);
+  const std::vector<Camera> found = run_cameras(model_of(run));
+  REQUIRE(found.size() == cameras.size());
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    CAPTURE(i);
+    CHECK(found[i].name == "a.png");
+    CHECK(found[i].model == cameras[i].model);
+    CHECK(found[i].fx == cameras[i].fx);
+    CHECK(found[i].fy == cameras[i].fy);
+    CHECK(found[i].cx == cameras[i].cx);
+    CHECK(found[i].cy == cameras[i].cy);
+    CHECK(found[i].distortion == cameras[i].distortion);
+    CHECK(glm::distance(found[i].center(), cameras[i].center()) < 1e-9);
+  }
+}
+
+TEST_CASE("principal points and lenses of a list that cannot be read are told by one sentence") {
+  const TemporaryDirectory folder;
+  const fs::path path = folder.path() / "cameras.json";
+  const auto entry = [](const std::string& keys) {
+    return R"({"position":[0,0,0],"rotation":[[1,0,0],[0,1,0],[0,0,1]],"width":8,"height":6,)" +
+           keys + "}";
+  };
+  const auto error_of = [&](const std::string& keys) {
+    std::ofstream(path) << "[" + entry(R"("fx":5,"fy":5)") + "," + entry(keys) + "]";
+    // A list that need not be whole lacks that one alone.
+    const auto listed = io::read_camera_list(path);
+    CHECK(listed.at(0).has_value());
+    CHECK_FALSE(listed.at(1).has_value());
+    const std::string message = test::data_error([&] { io::read_listed_views(path); });
+    CHECK(test::contains(message, "cameras.json, entry 1"));
+    return message;
+  };
+  CHECK(test::contains(error_of(R"("fx":5,"fy":5,"cx":[4])"), "'cx' is not a number"));
+  CHECK(test::contains(error_of(R"("fx":5,"fy":5,"k1":"much")"), "'k1' is not a number"));
+  CHECK(test::contains(error_of(R"("fx":5,"fy":5,"camera_model":7)"), "is not a text"));
+  CHECK(test::contains(error_of(R"("fx":5,"fy":5,"camera_model":"MAGIC")"), "'MAGIC'"));
+  CHECK(test::contains(error_of(R"("fx":5,"fy":5,"camera_model":"FISHEYE624")"), "twelve numbers"));
+  CHECK(test::contains(error_of(R"("fx":5,"camera_model":"OPENCV_FISHEYE")"), "'fx' and 'fy'"));
+  std::ofstream(path) << "[" + entry(R"("fx":5,"fy":5,"camera_model":"OPENCV","k1":1e9)") + "]";
+  CHECK(test::contains(test::data_error([&] { io::read_listed_views(path); }), "has a lens"));
 }
 
 TEST_CASE("models of no run have no cameras, and damaged files are told") {

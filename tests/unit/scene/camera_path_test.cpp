@@ -122,6 +122,30 @@ TEST_CASE("cameras and keyframes say the same") {
   CHECK(between(camera, other, 0.5).fx == doctest::Approx(60));
   CHECK(off(between(camera, other, 1).rotation, other.rotation) < 1e-9);
   CHECK(glm::distance(between(camera, other, 1.5).center(), glm::dvec3(4, 2, 3)) < 1e-9);
+  // Backwards from the last of a path: it moves on, and a zoom stays where it is.
+  CHECK(glm::distance(between(other, camera, -0.5).center(), glm::dvec3(4, 2, 3)) < 1e-9);
+  CHECK(off(between(other, camera, -0.5).rotation, between(camera, other, 1.5).rotation) < 1e-9);
+  CHECK(between(other, camera, -0.5).fx == 65);
+  CHECK(between(camera, other, 1.5).fx == 65);
+}
+
+TEST_CASE("between cameras of different sizes or lenses the first keeps its own") {
+  const Camera camera = look_at({1, 2, 3}, {0, 0, 0}, {0, -1, 0}, 80, 60, 55);
+  Camera other = look_at({3, 2, 3}, {0, 0, 0}, {0, -1, 0}, 80, 60, 65);
+  const auto check_kept = [&] {
+    const Camera half = between(camera, other, 0.5);
+    CHECK(half.fx == camera.fx);
+    CHECK(half.cx == camera.cx);
+    CHECK(half.width == camera.width);
+    CHECK(half.model == camera.model);
+    CHECK_FALSE(half.distortion.any());
+    CHECK(glm::distance(half.center(), glm::dvec3(2, 2, 3)) < 1e-9);
+  };
+  other.model = CameraModel::kOpenCv;
+  other.distortion.k1 = 0.1;
+  check_kept();
+  other = look_at({3, 2, 3}, {0, 0, 0}, {0, -1, 0}, 160, 60, 65);
+  check_kept();
 }
 
 TEST_CASE("paths along photos lie where the photos do") {
