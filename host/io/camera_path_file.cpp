@@ -154,6 +154,21 @@ CameraModel model_of(const std::filesystem::path& path, const Json& json) {
                   path.string(), type));
 }
 
+/// That of a keyframe or frame, of a fisheye as with_lens() takes it; no panorama has any.
+double fov_of(const std::filesystem::path& path,
+              const Json& entry,
+              CameraModel model,
+              double otherwise) {
+  const double fov = number(path, entry, "fov", kLeastFov, 360.0, otherwise);
+  const double most = most_fov(CameraModel::kPinhole);
+  if (model == CameraModel::kEquirectangular || fov <= most) return fov;
+  fail(path,
+       fmt::format("has the 'fov' {:g} where at most {:g} degrees belong{}", fov, most,
+                   model == CameraModel::kFisheye ? ": that of a fisheye is, as in nerfstudio, "
+                                                    "that of the pinhole with its focal length"
+                                                  : ""));
+}
+
 Stored read_json(const std::filesystem::path& path) {
   const Json json = io::read_json_object(path);
   Stored out;
@@ -182,7 +197,7 @@ Stored read_json(const std::filesystem::path& path) {
     if (!entry.is_object()) fail(path, "has an entry that is no object");
     Keyframe key;
     set_pose(path, matrix_of(path, entry, frames ? "camera_to_world" : "matrix"), key);
-    key.fov = number(path, entry, "fov", kLeastFov, 359.0, fov);
+    key.fov = fov_of(path, entry, out.model, fov);
     key.seconds = io::json_flag(entry, "override_transition_enabled")
                       ? number(path, entry, "override_transition_sec", 0, kMostSeconds, transition)
                       : (frames ? 1.0 : transition);

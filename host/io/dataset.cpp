@@ -24,6 +24,7 @@
 #include "io/photo_folder.hpp"
 #include "io/photo_mask.hpp"
 #include "io/photo_transparency.hpp"
+#include "io/photo_views.hpp"
 #include "io/ply_points.hpp"
 #include "io/polycam.hpp"
 #include "io/transforms.hpp"
@@ -36,11 +37,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void mark_every(std::vector<View>& views, int test_every) {
+void mark_every(Dataset& dataset, int test_every) {
+  std::vector<View>& views = dataset.views;
   if (test_every <= 0) return;
   if (views.size() == 1 && test_every > 1) return;  // a photo alone is trained on
   const auto step = static_cast<std::size_t>(test_every);
   for (std::size_t i = 0; i < views.size(); i += step) views[i].test = true;
+  dataset.test_every = test_every;
 }
 
 /// Counts all positions from the origin that the options or the scene say; `points`: of
@@ -101,7 +104,7 @@ Dataset load_colmap(const fs::path& root,
   dataset.points = std::move(model.points);
   dataset.views = io::colmap_views(model, model_folder, root, options);
   sort_by_name(dataset.views);
-  mark_every(dataset.views, options.test_every);
+  mark_every(dataset, options.test_every);
   set_origin(dataset, model.positions, options);
   return dataset;
 }
@@ -146,7 +149,7 @@ Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
     }
   } else {
     io::require_photos_of_their_own({&train});
-    mark_every(dataset.views, options.test_every);
+    mark_every(dataset, options.test_every);
   }
   set_origin(dataset, points, options);
   return dataset;
@@ -189,7 +192,7 @@ Dataset load_nerfstudio(const fs::path& path, const DatasetOptions& options) {
   dataset.views = views_of(file, options);
   const bool divided = io::divide_by_lists(file, names, dataset.views);
   sort_by_name(dataset.views);
-  if (!divided) mark_every(dataset.views, options.test_every);
+  if (!divided) mark_every(dataset, options.test_every);
   std::vector<double> points;
   if (const auto path = points_of(file)) points = take_points(dataset, *path);
   set_origin(dataset, points, options);
@@ -202,7 +205,7 @@ Dataset load_frames(DatasetKind kind, io::TransformsFile file, const DatasetOpti
   dataset.kind = kind;
   dataset.views = views_of(file, options);
   sort_by_name(dataset.views);
-  mark_every(dataset.views, options.test_every);
+  mark_every(dataset, options.test_every);
   set_origin(dataset, {}, options);
   return dataset;
 }
@@ -315,6 +318,7 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
   }
   warn_of_repeated_photos(dataset.views);
   io::warn_of_color_profiles(dataset.views);
+  io::warn_of_folding_lenses(dataset.views);
   dataset.alpha_is_background = shows_cut_outs(dataset, options.alpha);
   const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
   const auto masked = std::count_if(dataset.views.begin(), dataset.views.end(), has_mask);

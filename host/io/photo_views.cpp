@@ -4,16 +4,36 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <numbers>
 #include <utility>
 
 #include "io/photo_orientation.hpp"
 #include "raysplats/error.hpp"
 #include "scene/camera_check.hpp"
+#include "scene/camera_model.hpp"
 #include "scene/photo_lens.hpp"
 
 namespace raysplats::io {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+/// Image radius at which the lens of a photo of a plane folds back or ends; 0 for others, of which
+/// fisheyes may show a circle on purpose.
+double folding_radius(const Camera& photo) {
+  if (photo.model == CameraModel::kOpenCv)
+    return radial_image(photo.model, photo.distortion, lens_limit(photo.model, photo.distortion));
+  if (!photo.lens || photo.lens->form != PhotoLens::Form::kPerspective) return 0;
+  const double edge = photo.lens->limit * (1 - 1e-9);
+  const auto seen = lens_point(*photo.lens, {std::sin(edge), 0.0, std::cos(edge)});
+  return seen ? glm::length(*seen) : 0;
+}
+
+}  // namespace
 
 void set_cameras(
     View& view, const Camera& nominal, ImageSize photo, double factor, bool undistort) {
@@ -51,6 +71,26 @@ void leave_out_missing(std::size_t missing,
                        const std::string& advice) {
   if (2 * missing > all) throw DataError(fmt::format("{}: {}", what, advice));
   spdlog::warn("{}: they are left out", what);
+}
+
+void warn_of_folding_lenses(const std::vector<View>& views) {
+  std::size_t folding = 0;
+  double first_lost = 0;
+  fs::path first;
+  for (const View& view : views) {
+    const Camera& photo = view.source_camera;
+    const double radius = folding_radius(photo);
+    const double half = 0.5 * std::min(photo.width / photo.fx, photo.height / photo.fy);
+    if (!(radius > 0 && radius < half) || folding++ > 0) continue;
+    const double circle = std::numbers::pi * radius * radius * photo.fx * photo.fy;
+    first_lost = 1 - circle / photo.width / photo.height;
+    first = view.image_path;
+  }
+  if (folding == 0) return;
+  spdlog::warn(
+      "The lenses of {} of {} photos fold back well within the photo, which loses what is outside "
+      "({:.0f} % of {}, the first): correct their distortion, or undistort the images first",
+      folding, views.size(), 100 * first_lost, first.string());
 }
 
 void refuse_shared_photo(const std::string& first,

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "io/image_file.hpp"
 #include "raysplats/dataset.hpp"
@@ -23,6 +24,10 @@ void leave_out_missing(std::size_t missing,
                        std::size_t all,
                        const std::string& what,
                        const std::string& advice);
+
+/// Warns once of photos of planes whose lens folds back (lens_limit()) within half of their smaller
+/// side: its polynomial does not fit the photo, most of which is lost.
+void warn_of_folding_lenses(const std::vector<View>& views);
 
 /// Throws DataError: two images of `cameras`, a file or model by its name, have one photo.
 [[noreturn]] void refuse_shared_photo(const std::string& first,

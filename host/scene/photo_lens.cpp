@@ -106,6 +106,40 @@ double angle_of(const PhotoLens& lens, double image) {
   return 0.5 * (low + high);
 }
 
+/// Whether the image grows in every direction from the axis at the angle `t`.
+bool grows_at(const PhotoLens& lens, double t) {
+  constexpr int kWays = 32;
+  for (int way = 0; way < kWays; ++way) {
+    const double a = 2 * kPi * way / kWays;
+    // Written so that NaN does not grow.
+    if (!(slope(lens, {t * std::cos(a), t * std::sin(a)}).determinant() > 0)) return false;
+  }
+  return true;
+}
+
+/// The angle up to `end` within which no place of the image is seen twice: it ends before the first
+/// ring on which the image turns over.
+double single_until(const PhotoLens& lens, double end) {
+  constexpr int kRings = 48;
+  // On the fold itself Newton's method does not get near enough.
+  constexpr double kBeforeFold = 0.995;
+  double grows = 0;
+  for (int ring = 0; ring <= kRings; ++ring) {
+    const double here = std::max(end * ring / kRings, 1e-3);
+    if (grows_at(lens, here)) {
+      grows = here;
+      continue;
+    }
+    double folds = here;
+    for (int i = 0; i < 30; ++i) {
+      const double middle = 0.5 * (grows + folds);
+      (grows_at(lens, middle) ? grows : folds) = middle;
+    }
+    return kBeforeFold * grows;
+  }
+  return end;
+}
+
 void require_parameters(const PhotoLens& lens, const std::string& what) {
   const double a = lens.radial[0], b = lens.radial[1];
   if (lens.form == Form::kFov && !(std::abs(a) < kPi)) {
@@ -131,17 +165,13 @@ PhotoLens measured(PhotoLens lens, double widest, const std::string& what) {
   lens.limit = growing(lens);
   if (lens.radius > 0) lens.limit = angle_of(lens, lens.radius);
   constexpr double kLeast = 0.02;
-  bool folds = lens.limit < kLeast;
-  // Where the image turns over between the middle and the farthest corner, two places are one.
-  constexpr int kRings = 48, kWays = 32;
   const double end = std::min(angle_of(lens, widest), lens.limit - 1e-4);
-  for (int ring = 0; ring <= kRings && !folds; ++ring) {
-    for (int way = 0; way < kWays; ++way) {
-      const double t = std::max(end * ring / kRings, 1e-3), a = 2 * kPi * way / kWays;
-      folds = folds || !(slope(lens, {t * std::cos(a), t * std::sin(a)}).determinant() > 0);
-    }
-  }
-  if (folds) {
+  // Where the radius stops growing, however little is added to it makes the image turn over in some
+  // direction just before: there the lens ends. Nearer to the middle its parameters are wrong.
+  constexpr double kLeastShare = 0.5;
+  const double single = single_until(lens, end);
+  if (single < end) lens.limit = single;
+  if (!(lens.limit >= kLeast && single >= kLeastShare * end)) {
     throw DataError(
         fmt::format("{} has a lens that shows several directions in one place of the photo: "
                     "correct its distortion, or undistort the images first",
@@ -181,19 +211,25 @@ std::optional<glm::dvec2> lens_point(const PhotoLens& lens, const glm::dvec3& di
 
 std::optional<glm::dvec3> lens_direction(const PhotoLens& lens, const glm::dvec2& point) {
   const double image = glm::length(point);
-  // What is added is small, so that the radial solution is a start.
-  glm::dvec2 p = image > 0 ? point * (angle_of(lens, image) / image) : glm::dvec2(0.0);
+  // What is added is small, so that the radial solution is a start, a little before the fold.
+  const double start = std::min(angle_of(lens, image), 0.99 * lens.limit);
+  glm::dvec2 p = image > 0 ? point * (start / image) : glm::dvec2(0.0);
   glm::dvec2 residual = place(lens, p) - point;
   for (int i = 0; i < 50 && glm::length(residual) > 1e-14 * (1 + image); ++i) {
     const Slope s = slope(lens, p);
     const glm::dvec2 step = glm::dvec2(s.y.y * residual.x - s.y.x * residual.y,
                                        s.x.x * residual.y - s.x.y * residual.x) /
                             s.determinant();
-    p -= step;
-    const double t = glm::length(p);
-    // Beyond the limit there is nothing to follow; just before it there may be.
-    if (!(t <= lens.limit)) p *= 0.9999 * lens.limit / t;
-    residual = place(lens, p) - point;
+    // Near a fold the whole step may lead away, or beyond the limit, where there is nothing.
+    bool nearer = false;
+    for (double share = 1; share > 1e-4 && !nearer; share *= 0.5) {
+      const glm::dvec2 next = p - share * step, left = place(lens, next) - point;
+      nearer = glm::length(next) <= lens.limit && glm::length(left) < glm::length(residual);
+      if (!nearer) continue;
+      p = next;
+      residual = left;
+    }
+    if (!nearer) break;
   }
   if (!(glm::length(residual) <= 1e-9 * (1 + image))) return std::nullopt;
   const double t = glm::length(p);

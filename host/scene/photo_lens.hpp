@@ -39,9 +39,10 @@ struct PhotoLens {
 };
 
 /// The lens with its limit: where its image radius stops growing or reaches `radius`, at most pi
-/// (kPerspective and kFov: 89.9 degrees). Throws DataError, which begins with `what` ("the camera
-/// 3"), for parameters that no lens has: an image that does not grow from its middle, and one in
-/// which places within the limit and within `widest` (image radius) are seen twice.
+/// (kPerspective and kFov: 89.9 degrees), and within `widest` (image radius) before what is added
+/// makes places be seen twice. Throws DataError, which begins with `what` ("the camera 3"), for
+/// parameters that no lens has: an image that does not grow from its middle, and one in which
+/// places are seen twice in the inner half of these angles.
 PhotoLens measured(PhotoLens lens, double widest, const std::string& what);
 
 /// Distance of the farthest corner from the axis, in normalised image coordinates.

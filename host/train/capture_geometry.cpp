@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+#include <glm/trigonometric.hpp>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -21,7 +22,8 @@ namespace {
 constexpr std::size_t kLeastCameras = 8;  // of which one may be a stray
 constexpr std::size_t kOneStrayIn = 20;
 constexpr double kStrayFactor = 8.0;
-constexpr double kOnePlace = 1e-3;  // of what cameras see: nearer than this is no distance
+constexpr std::size_t kMostAsking = 200;  // axes for their nearest one, which is sought among all
+constexpr double kOnePlace = 1e-3;        // of what cameras see: nearer than this is no distance
 
 glm::dvec3 mean_center(std::span<const Camera> cameras) {
   glm::dvec3 sum(0.0);
@@ -42,6 +44,32 @@ std::vector<Camera> usual(std::span<const Camera> cameras) {
   std::vector<Camera> out;
   for (const std::size_t i : usual_cameras(cameras)) out.push_back(cameras[i]);
   return out;
+}
+
+std::vector<glm::dvec3> axes_of(std::span<const Camera> cameras) {
+  std::vector<glm::dvec3> out;
+  out.reserve(cameras.size());
+  for (const Camera& camera : cameras) out.push_back(view_axis(camera));
+  return out;
+}
+
+// The median angle from an axis to the nearest one of `others`, radians; of the same axes to the
+// nearest other one.
+double median_turn(const std::vector<glm::dvec3>& axes, const std::vector<glm::dvec3>& others) {
+  const bool same = &axes == &others;
+  std::vector<double> turns;
+  for (const std::size_t i : even_choice(axes.size(), kMostAsking)) {
+    double cosine = -1;
+    for (std::size_t j = 0; j < others.size(); ++j) {
+      if (!same || j != i) cosine = std::max(cosine, glm::dot(axes[i], others[j]));
+    }
+    turns.push_back(std::acos(std::min(cosine, 1.0)));
+  }
+  return median(std::move(turns));
+}
+
+bool sees_far_around(const Camera& camera) {
+  return camera.model == CameraModel::kEquirectangular || camera.model == CameraModel::kFisheye;
 }
 
 }  // namespace
@@ -129,6 +157,19 @@ Region visible_region(std::span<const Camera> all, double extent) {
 double motion_extent(std::span<const Camera> cameras, double extent) {
   constexpr double kMostHalves = 5.0;  // usual lenses have 0.5 to 4.7
   return std::min(extent, kMostHalves * visible_region(cameras, extent).half_side);
+}
+
+bool look_elsewhere(std::span<const Camera> held_out, std::span<const Camera> trained) {
+  constexpr std::size_t kLeastHeldOut = 3;
+  constexpr double kLeastTurn = glm::radians(15.0);
+  constexpr double kTimesUsual = 5.0;  // without rigs captures have up to 1.8
+  if (held_out.size() < kLeastHeldOut || trained.size() < 2) return false;
+  if (std::any_of(held_out.begin(), held_out.end(), sees_far_around) ||
+      std::any_of(trained.begin(), trained.end(), sees_far_around))
+    return false;
+  const std::vector<glm::dvec3> axes = axes_of(trained);
+  const double turn = median_turn(axes_of(held_out), axes);
+  return turn > kLeastTurn && turn > kTimesUsual * median_turn(axes, axes);
 }
 
 double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point) {

@@ -43,6 +43,14 @@ Region visible_region(std::span<const Camera> cameras, double extent);
 /// lenses stand far apart around something small, which steps by their distance would tear apart.
 double motion_extent(std::span<const Camera> cameras, double extent);
 
+/// Whether the held-out cameras look where the trained ones do not, although these look where
+/// others of them do: the median angle from a held-out axis to the nearest trained one is above 15
+/// degrees and above five times that from a trained axis to the nearest other one. No for less than
+/// three held-out cameras, which may be odd ones, and where any lens sees far beyond its axis
+/// (fisheyes, panoramas). Of many cameras some hundred, evenly spread, are compared with all
+/// others.
+bool look_elsewhere(std::span<const Camera> held_out, std::span<const Camera> trained);
+
 /// From the point to the nearest camera; infinite without cameras.
 double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point);
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "io/dataset_views.hpp"
 #include "run/former_metrics.hpp"
 #include "run/train_config.hpp"
 #include "scene/even_choice.hpp"
@@ -46,6 +47,28 @@ void warn_of_strays(std::span<const Camera> cameras) {
       strays.size(), cameras.size(), cameras[strays.front()].name);
 }
 
+// Pictures of a rig are named frame by frame: where the number of its lenses is a multiple of the
+// step, counting holds out the same lenses of every frame.
+void warn_of_one_direction(const Dataset& dataset,
+                           std::span<const Camera> held_out,
+                           std::span<const Camera> trained) {
+  if (dataset.test_every == 0 || !look_elsewhere(held_out, trained)) return;
+  const auto no_better = [&](std::size_t every) {
+    std::vector<Camera> multiples, others;
+    for (std::size_t i = 0; i < dataset.views.size(); ++i)
+      (i % every == 0 ? multiples : others).push_back(dataset.views[i].camera);
+    return look_elsewhere(multiples, others);
+  };
+  // Ends at the latest where less than three views are held out.
+  auto better = static_cast<std::size_t>(dataset.test_every) + 1;
+  while (no_better(better)) ++better;
+  spdlog::warn(
+      "most of the {} held-out photos look where no training photo does (is one in {} always of "
+      "the same lens of a rig?): the model lacks what they show, and metrics judge it there alone; "
+      "--test-every {} holds out photos of other lenses as well",
+      held_out.size(), dataset.test_every, better);
+}
+
 // A length is the user's to choose, and that of a run by time nobody knows beforehand.
 void note_many_passes(const TrainOptions& options, std::size_t photos) {
   const std::int64_t asked = run_length({}, photos);
@@ -56,6 +79,17 @@ void note_many_passes(const TrainOptions& options, std::size_t photos) {
       "them; without -n and --time a run has {}",
       counted(last_iteration(options), "iteration"), photos,
       views / static_cast<std::int64_t>(photos), asked);
+}
+
+// `order`: of the run's views, a copy that moves on.
+void note_unseen(const TrainOptions& options, std::size_t photos, ViewOrder order) {
+  const std::int64_t views = last_iteration(options) * options.views_per_step;
+  if (views >= static_cast<std::int64_t>(photos)) return;
+  std::vector<bool> seen(photos);
+  for (std::int64_t turn = 0; turn < views; ++turn) seen[order.at(turn)] = true;
+  const auto unseen = static_cast<std::size_t>(std::count(seen.begin(), seen.end(), false));
+  spdlog::info("within {} the run never looks at {} of the {} training photos",
+               counted(last_iteration(options), "iteration"), unseen, photos);
 }
 
 // `shown`: the share of the photos that counts.
@@ -290,7 +324,9 @@ void Trainer::Impl::start() {
     spdlog::warn("{} of {}: depth is open, and other views will look wrong",
                  counted(train_views.size(), "training view"), dataset.root.string());
   }
+  warn_of_one_direction(dataset, cameras_of(dataset, test_views), train_cameras);
   note_many_passes(options, train_views.size());
+  note_unseen(options, train_views.size(), order);
   warn_of_late("eval-at", options.eval_at, options);
   warn_of_late("save-at", options.save_at, options);
   if (options.scale_activation == ScaleActivation::kSigmoid && extent > kSigmoidExtent) {

@@ -66,6 +66,7 @@ struct Dataset {
   bool alpha_is_background = false;  ///< RGBA is composited over the background (AlphaUse, or
                                      ///< MaskUse::kCutout), else alpha is a mask
   std::array<double, 3> origin{};    ///< what was taken off all positions of the files
+  int test_every = 0;  ///< every n-th view is held out; 0 = files name those, or none is
 
   /// Positions in `views` of those of a split, in their order.
   std::vector<std::size_t> indices(Split split) const;

@@ -175,6 +175,23 @@ TEST_CASE("that nerfstudio's crop is not drawn is said, where a path has one") {
   }
 }
 
+TEST_CASE("a fov that no pinhole has is refused, of fisheyes with nerfstudio's convention") {
+  const Folder folder;
+  json file = key_file(matrix_at(0), matrix_at(4));
+  for (const double fov : {180.0, 200.0, 359.5}) {
+    CAPTURE(fov);
+    file["keyframes"][1]["fov"] = fov;
+    const auto said = [&](const char* type) {
+      file["camera_type"] = type;
+      return refusal(folder.write("path.json", file.dump()));
+    };
+    CHECK(said("perspective").find("at most 179.9 degrees") != std::string::npos);
+    CHECK(said("perspective").find("fisheye") == std::string::npos);
+    CHECK(said("fisheye").find("pinhole with its focal length") != std::string::npos);
+    CHECK(said("equirectangular").empty());
+  }
+}
+
 TEST_CASE("keyframes in TOML are eye, target, up, angle and seconds") {
   const Folder folder;
   const auto path = folder.write("path.toml", R"(

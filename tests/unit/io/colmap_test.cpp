@@ -317,6 +317,7 @@ TEST_CASE("masks beside the photos and test_every are honoured") {
   options.test_every = 3;
   const Dataset dataset = load_dataset(scratch.path(), options);
   CHECK(dataset.indices(Split::kTest) == std::vector<std::size_t>{0, 3, 6, 9});
+  CHECK(dataset.test_every == 3);
   CHECK(dataset.views[9].camera.name == "photo 8.png");
   const View& masked = dataset.views[9];
   REQUIRE(!masked.mask_path.empty());

@@ -4,7 +4,9 @@
 #include <OpenImageIO/imageio.h>
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <glm/geometric.hpp>
@@ -17,6 +19,7 @@
 #include "raysplats/dataset.hpp"
 #include "scene/camera_model.hpp"
 #include "unit/io/data_sets.hpp"
+#include "unit/log_capture.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;
@@ -303,6 +306,76 @@ TEST_CASE("lenses that cannot be inverted are refused by one sentence") {
   const Image image = load_view_image(load_dataset(scratch / "ends").views.front());
   CHECK(image.at(80, 60, 3) == 1.0f);
   CHECK(image.at(0, 0, 3) == 0.0f);
+}
+
+TEST_CASE("circular fisheyes to which something is added end a little before their fold") {
+  Camera camera;
+  camera.width = 90;
+  camera.height = 70;
+  camera.fx = 25;
+  camera.fy = 26;
+  camera.cx = 43.5;
+  camera.cy = 34.2;
+  PhotoLens plain;
+  plain.form = PhotoLens::Form::kFisheye;
+  plain.radial[0] = -0.05;
+  const double fold = std::sqrt(1 / 0.15);
+  for (const double p : {0.0, 3e-4, 1e-3, 3e-3}) {
+    for (int kind = 0; kind < 4; ++kind) {
+      CAPTURE(p);
+      CAPTURE(kind);
+      PhotoLens lens = plain;
+      if (kind == 0) lens.p1 = p;
+      if (kind == 1) lens.p2 = p;
+      if (kind == 2) lens.prism = {p, 0, -p, 0};
+      if (kind == 3) lens.p1 = p;
+      lens.decentred_last = kind == 3;
+      set_photo_lens(camera, lens, "the camera");
+      const PhotoLens& got = *camera.lens;
+      CHECK(got.limit > 0.97 * fold);
+      CHECK(got.limit < fold);
+      std::size_t lost = 0;
+      double worst = 0;
+      for (int i = 1; i <= 100; ++i) {
+        for (int way = 0; way < 40; ++way) {
+          const glm::dvec3 direction = towards(0.9999 * got.limit * i / 100, 0.157 * way);
+          const auto seen = lens_point(got, direction);
+          REQUIRE(seen);
+          const auto back = lens_direction(got, *seen);
+          lost += back ? 0 : 1;
+          if (back) worst = std::max(worst, glm::distance(*back, direction));
+        }
+      }
+      CHECK(lost == 0);
+      CHECK(worst < 1e-6);
+    }
+  }
+}
+
+TEST_CASE("one warning counts the photos whose lens folds back well within them") {
+  const auto said = [](int model, const char* name, const Numbers& parameters) {
+    const Scratch scratch;
+    ColmapFixture fixture = one_camera({model, name, {}, {}, 0, CameraModel::kPinhole}, parameters);
+    fixture.cameras.front().width = 90;
+    fixture.cameras.front().height = 70;
+    fixture.images.push_back({2, {1, 0, 0, 0, 0, 0, 1}, 3, "b.png", 0});
+    fixture.write_binary(scratch / "sparse/0");
+    write_photos(fixture, scratch / "images", 90, 70);
+    const LogCapture log;
+    load_dataset(scratch.path());
+    CHECK(log.contains("fold back") == log.contains("lenses of 2 of 2 photos"));
+    // The circle has a radius of 21.8 pixels.
+    CHECK(log.contains("fold back") == log.contains("76 %"));
+    return log.contains("fold back");
+  };
+  CHECK(said(2, "SIMPLE_RADIAL", {40, 45, 35, -0.5}));
+  CHECK(said(3, "RADIAL", {40, 45, 35, -0.5, 0}));
+  CHECK(said(4, "OPENCV", {40, 40, 45, 35, -0.5, 0, 0.001, 0}));
+  CHECK(said(6, "FULL_OPENCV", {40, 40, 45, 35, -0.5, 0, 0, 0, 0, 1e-6, 0, 0}));
+  CHECK(!said(2, "SIMPLE_RADIAL", {40, 45, 35, -0.1}));
+  CHECK(!said(2, "SIMPLE_RADIAL", {40, 45, 35, 0.5}));
+  // The circle of a fisheye may lie within the photo.
+  CHECK(!said(8, "SIMPLE_RADIAL_FISHEYE", {20, 45, 35, -0.2}));
 }
 
 TEST_CASE("nerfstudio's FISHEYE624, k4 of planes, decentred fisheyes and crops") {

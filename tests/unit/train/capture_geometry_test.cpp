@@ -66,6 +66,32 @@ TEST_CASE("means move by what cameras see where these stand far away, else by th
   CHECK(motion_of(telephoto) == camera_extent(telephoto));
 }
 
+TEST_CASE("held-out cameras look elsewhere where counting holds out one lens of a rig") {
+  const auto told = [](const std::vector<Camera>& cameras, std::size_t every) {
+    std::vector<Camera> held_out, trained;
+    for (std::size_t i = 0; i < cameras.size(); ++i)
+      (i % every == 0 ? held_out : trained).push_back(cameras[i]);
+    return look_elsewhere(held_out, trained);
+  };
+  const std::vector<Camera> rig = rig_of_eight(4);
+  CHECK(told(rig, 8));
+  CHECK_FALSE(told(rig, 9));
+  CHECK_FALSE(told(rig, 5));
+  // Every second lens, each 45 degrees from its neighbours.
+  CHECK(told(rig, 2));
+  CHECK(told(rig_of_eight(400), 8));
+  // Two held-out photos may be odd ones.
+  CHECK_FALSE(told(rig_of_eight(2), 8));
+  // Wherever its axis is, such a lens sees what the others do.
+  for (const CameraModel model : {CameraModel::kFisheye, CameraModel::kEquirectangular}) {
+    std::vector<Camera> wide = rig;
+    wide[3].model = model;
+    CHECK_FALSE(told(wide, 8));
+  }
+  // Captures of one camera, dense and sparse: all have their neighbours.
+  for (const int count : {24, 32, 200}) CHECK_FALSE(told(ring(count, 4.0, {0, 0, 0}), 8));
+}
+
 TEST_CASE("cameras far from all others have no say in lengths, as long as they are exceptions") {
   const glm::dvec3 target(3, -2, 1);
   const std::vector<Camera> sound = ring(20, 4.0, target);

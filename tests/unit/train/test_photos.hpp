@@ -24,6 +24,19 @@ inline std::vector<Camera> ring(int count, double radius, const glm::dvec3& targ
   return cameras;
 }
 
+/// A rig of eight lenses, 45 degrees apart, in so many places of a line: place by place, as
+/// pictures are named.
+inline std::vector<Camera> rig_of_eight(int places) {
+  std::vector<Camera> cameras;
+  for (int i = 0; i < 8 * places; ++i) {
+    const double angle = 2 * 3.14159265358979 * (i % 8) / 8;
+    const glm::dvec3 eye(0.1 * (i / 8), 0, 0);
+    cameras.push_back(
+        look_at(eye, eye + glm::dvec3(std::cos(angle), std::sin(angle), 0), {0, 0, 1}, 40, 32, 35));
+  }
+  return cameras;
+}
+
 /// The photo that `color` of each pixel's ray makes.
 template <class Color>
 SmallPhoto photo_of(const Camera& camera, const Color& color) {

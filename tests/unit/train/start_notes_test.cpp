@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a run says at its start of the photos that it was given.
+#include <doctest/doctest.h>
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "raysplats/trainer.hpp"
+#include "unit/log_capture.hpp"
+#include "unit/train/photographed.hpp"
+#include "unit/train/short_training.hpp"
+#include "unit/train/test_photos.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+// Photos of which counting holds out every n-th, unless n is 0.
+struct Capture : Photographed {
+  explicit Capture(const std::vector<Camera>& cameras)
+      : Photographed(coloured_cloud(60, 0.6, 31), cameras) {}
+
+  void hold_out(int every) {
+    dataset.test_every = every;
+    for (std::size_t i = 0; i < dataset.views.size(); ++i)
+      dataset.views[i].test = every > 0 && i % static_cast<std::size_t>(every) == 0;
+  }
+
+  // Whether the start of a run says so.
+  bool says(const std::string& part, TrainOptions options) {
+    options.init = "random";
+    options.init_count = 100;
+    options.max_gaussians = 100;
+    const LogCapture log;
+    Trainer trainer(context, dataset, options, folder / ("run" + std::to_string(runs++)));
+    trainer.step();
+    return log.contains(part);
+  }
+
+  int runs = 0;
+};
+
+}  // namespace
+
+TEST_CASE("a run is warned of held-out photos that are all of one lens of a rig") {
+  const std::string warning = "look where no training photo does", advice = "--test-every 9 holds";
+  const TrainOptions options = short_training(40);
+  Capture rig(rig_of_eight(4));
+  rig.hold_out(8);
+  CHECK(rig.says("most of the 4 held-out photos " + warning, options));
+  CHECK(rig.says(advice, options));
+  // Where the files of a data set name its test views, another number changes nothing.
+  rig.dataset.test_every = 0;
+  CHECK_FALSE(rig.says(warning, options));
+  rig.hold_out(9);
+  CHECK_FALSE(rig.says(warning, options));
+  rig.hold_out(2);
+  CHECK(rig.says("--test-every 3 holds", options));
+
+  Capture orbit(ring(32, 3.0, {0, 0, 0}));
+  orbit.hold_out(8);
+  CHECK_FALSE(orbit.says(warning, options));
+}
+
+TEST_CASE("a run that ends within its first pass says how many photos it never looks at") {
+  Capture capture(ring(8, 3.0, {0, 0, 0}));
+  capture.hold_out(0);
+  TrainOptions options = short_training(5);
+  CHECK(capture.says("within 5 iterations the run never looks at 3 of the 8 training photos",
+                     options));
+  options.iterations = 8;
+  CHECK_FALSE(capture.says("never looks at", options));
+  options.views_per_step = 2;
+  options.iterations = 3;
+  CHECK(capture.says("within 3 iterations the run never looks at 2 of the 8", options));
+  options.iterations = 4;
+  CHECK_FALSE(capture.says("never looks at", options));
+}
