@@ -1,17 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """raysplats.torch.rasterization: gsplat's call, answered by ray tracing."""
 
+import atexit
 import collections
+import copy
+import math
+import operator
 import threading
 
 import torch
+from torch.autograd.function import once_differentiable
 
 from . import _raysplats as rs
+from ._checks import pose_matrix, require_shape, require_tensor
 
 _SH_0 = 0.28209479177387814
-# Beyond this opacity the logit leaves float32's useful range.
-_MOST_OPACITY = 1 - 1e-6
-_LEAST_OPACITY = 1e-6
+# The tracer takes logits, and its gradients have opacity times 1 - opacity as a factor. Nearer to 1 single precision
+# holds too little of that: here it holds all, and a device that is off by the last bit of an opacity is off by 1/256.
+_LEAST_OPACITY = 2.0**-16
+_MOST_OPACITY = 1 - _LEAST_OPACITY
+# Below it rounding may clamp a colour at 0, where it has no gradient.
+_LEAST_COLOR = 1e-6
+# Has a logarithm, and is below the least size that the tracer draws (cl/trace/view.h).
+_LEAST_SCALE = 1e-30
 _MODES = ("RGB", "D", "ED", "RGB+D", "RGB+ED")
 _CAMERA_MODELS = {"pinhole": "pinhole", "ortho": "orthographic", "fisheye": "fisheye"}
 # Each holds a model and its pictures on the device: scripts have few sets of options at a time.
@@ -31,13 +42,36 @@ def _refuse(name, why):
     raise NotImplementedError(f"rasterization of raysplats does not support {name}: {why}")
 
 
-def _require_shape(name, tensor, shape):
-    if tuple(tensor.shape) != shape:
-        raise rs.UsageError(f"{name} has the shape {tuple(tensor.shape)}, but {shape} is needed")
+def _whole_number(name, given):
+    try:
+        return operator.index(given)
+    except TypeError:
+        raise TypeError(f"{name} has to be a whole number, not {type(given).__name__}") from None
 
 
-def _option_names():
-    return [name for name in dir(rs.TraceOptions) if isinstance(getattr(rs.TraceOptions, name), property)]
+def _number(name, given):
+    try:
+        return float(given)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} has to be a number, not {type(given).__name__}") from None
+
+
+def _pixels(name, given):
+    count = _whole_number(name, given)
+    if not 1 <= count <= 2**31 - 1:
+        raise rs.UsageError(f"{name} is {count} pixels, which no picture has")
+    return count
+
+
+def _require_numbers(named):
+    """Refuses the first tensor that has a number that no Gaussian has."""
+    for name, tensor in named.items():
+        tensor = tensor.detach()
+        good, needed = torch.isfinite(tensor), "finite"
+        if name == "scales":
+            good, needed = good & (tensor >= 0), "finite and at least 0"
+        if not good.all():
+            raise rs.DataError(f"{name} has the number {tensor[~good][0].item():g}, but all have to be {needed}")
 
 
 def _renderer(options, near_plane, depth):
@@ -45,12 +79,9 @@ def _renderer(options, near_plane, depth):
     context."""
     from .torch import Renderer
 
-    chosen = rs.TraceOptions(hit_order="peak", adaptive_radius=True)
-    if options is not None:
-        for name in _option_names():
-            setattr(chosen, name, getattr(options, name))
+    chosen = rs.TraceOptions.peak_order() if options is None else copy.copy(options)
     chosen.near_depth, chosen.depth, chosen.background = near_plane, depth, (0, 0, 0)
-    key = str([(name, getattr(chosen, name)) for name in _option_names()])
+    key = str(chosen.__getstate__())
     with _renderers_lock:
         if key not in _renderers:
             context = next((each.context for each in _renderers.values()), None)
@@ -61,30 +92,91 @@ def _renderer(options, near_plane, depth):
         return _renderers[key]
 
 
-def _camera(k, width, height, camera_model, radial):
-    k = k.detach().cpu().double()
-    if k[0, 1] != 0:
+@atexit.register
+def _forget_renderers():
+    with _renderers_lock:
+        _renderers.clear()
+
+
+def _camera(i, k, width, height, camera_model, radial):
+    k = k.detach().cpu().double().tolist()
+    if not all(math.isfinite(each) for row in k for each in row):
+        raise rs.UsageError(f"Ks[{i}] has numbers that are not finite")
+    (fx, skew, cx), (below, fy, cy), last = k
+    if below != 0 or last != [0, 0, 1]:
+        raise rs.UsageError(f"Ks[{i}] is no matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]: is it transposed?")
+    if skew != 0:
         _refuse("Ks with skew", "pixels have right angles")
+    if min(fx, fy) <= 0:
+        raise rs.UsageError(f"Ks[{i}] has focal lengths of {fx:g} and {fy:g} pixels, but both are above 0")
     lens = [0.0] * 6
     if radial is not None:
-        lens[0], lens[1], lens[2], lens[5] = (float(each) for each in radial)
-    return rs.Camera(
-        width,
-        height,
-        float(k[0, 0]),
-        float(k[1, 1]),
-        float(k[0, 2]),
-        float(k[1, 2]),
-        model=_CAMERA_MODELS[camera_model],
-        distortion=lens,
-    )
+        lens[0], lens[1], lens[2], lens[5] = radial.detach().cpu().double().tolist()
+        if not all(math.isfinite(each) for each in lens):
+            raise rs.UsageError(f"radial_coeffs[{i}] has numbers that are not finite")
+    model = _CAMERA_MODELS[camera_model]
+    return rs.Camera(width, height, fx, fy, cx, cy, model=model, distortion=lens, name=f"viewmats[{i}]")
 
 
-def _harmonics(colors, sh_degree):
+class _Logits(torch.autograd.Function):
+    """Logits of opacities for the tracer, with the gradients of opacities up to both ends of [0, 1]: those at the
+    nearest opacity that the tracer knows."""
+
+    @staticmethod
+    def forward(ctx, opacities):
+        logits = torch.logit(opacities.clamp(_LEAST_OPACITY, _MOST_OPACITY))
+        ctx.save_for_backward(logits)
+        return logits
+
+    @staticmethod
+    @once_differentiable
+    def backward(ctx, gradient):
+        (logits,) = ctx.saved_tensors
+        # Rounded as the device rounds it (cl/shared/activation.h): the factor that goes out is the one that it put in.
+        opacities = 1 / (1 + torch.exp(-logits))
+        return gradient / (opacities * (1 - opacities))
+
+
+def _logits(opacities):
+    return _Logits.apply(opacities.contiguous())
+
+
+def _log_scales(scales):
+    return torch.where(scales == 0, torch.full_like(scales, _LEAST_SCALE), scales).log().contiguous()
+
+
+def _lift(colors, sh_degree):
+    """What is added to colours so that none is clamped at 0: they have gradients there, and count below it too. A
+    picture of lifted colours is brighter by it times alpha."""
+    if sh_degree is not None or colors.numel() == 0:
+        return 0.0
+    least = colors.detach().min().item()
+    return 0.0 if least > _LEAST_COLOR else 0.5 - least
+
+
+def _harmonics(colors, sh_degree, lift):
     """Coefficients (N, K, 3) of one camera's colours, (N, K', 3) or (N, 3)."""
     if sh_degree is None:
-        return ((colors - 0.5) / _SH_0)[:, None, :]
+        return ((colors + (lift - 0.5)) / _SH_0)[:, None, :]
     return colors[:, : (sh_degree + 1) ** 2, :]
+
+
+def _check_colors(colors, sh_degree, count, views):
+    """Whether each camera has colours of its own."""
+    if sh_degree is None:
+        per_view = colors.dim() == 3
+        if colors.dim() > 1 and colors.shape[-1] != 3:
+            _refuse("colors of other than 3 channels", f"these have {colors.shape[-1]}")
+        require_shape("colors", colors, (views, count, 3) if per_view else (count, 3))
+        return per_view
+    if not 0 <= sh_degree <= 4:
+        raise rs.UsageError(f"sh_degree is 0 to 4, not {sh_degree}")
+    per_view = colors.dim() == 4
+    require_shape("colors", colors, (views, count, "K", 3) if per_view else (count, "K", 3))
+    bands = (sh_degree + 1) ** 2
+    if colors.shape[-2] < bands:
+        raise rs.UsageError(f"colors has {colors.shape[-2]} coefficients, but sh_degree {sh_degree} needs {bands}")
+    return per_view
 
 
 def rasterization(
@@ -133,22 +225,40 @@ def rasterization(
     in docs/python.md; what is not supported raises NotImplementedError that names it. `options`: a
     raysplats.TraceOptions, else the order of hits and the radius that raysplats trains with.
     """
-    if means.dim() != 2:
-        _refuse("batches of scenes", f"means has the shape {tuple(means.shape)}, not (N, 3)")
-    count, views = means.shape[0], viewmats.shape[0]
-    _require_shape("means", means, (count, 3))
-    _require_shape("viewmats", viewmats, (views, 4, 4))
-    _require_shape("Ks", Ks, (views, 3, 3))
-    _require_shape("opacities", opacities, (count,))
     if covars is not None:
         _refuse("covars", "give quats and scales")
-    _require_shape("quats", quats, (count, 4))
-    _require_shape("scales", scales, (count, 3))
+    gaussians = {"means": means, "quats": quats, "scales": scales, "opacities": opacities, "colors": colors}
+    for name, each in gaussians.items():
+        require_tensor(name, each, torch.float32)
+    for name, each in {"viewmats": viewmats, "Ks": Ks}.items():
+        require_tensor(name, each)
+    for name, each in {"backgrounds": backgrounds, "radial_coeffs": radial_coeffs}.items():
+        if each is not None:
+            require_tensor(name, each)
+    if means.dim() > 2:
+        _refuse("batches of scenes", f"means has the shape {tuple(means.shape)}, not (N, 3)")
+    require_shape("means", means, ("N", 3))
+    require_shape("viewmats", viewmats, ("C", 4, 4))
+    count, views = means.shape[0], viewmats.shape[0]
+    if views == 0:
+        raise rs.UsageError("viewmats has no camera, but at least one is needed")
+    require_shape("Ks", Ks, (views, 3, 3))
+    require_shape("opacities", opacities, (count,))
+    require_shape("quats", quats, (count, 4))
+    require_shape("scales", scales, (count, 3))
+    width, height = _pixels("width", width), _pixels("height", height)
+    near_plane, far_plane = _number("near_plane", near_plane), _number("far_plane", far_plane)
+    if not 0 <= near_plane < math.inf:
+        raise rs.UsageError(f"near_plane is a depth of at least 0, not {near_plane:g}")
+    if options is not None and not isinstance(options, rs.TraceOptions):
+        raise TypeError(f"options has to be a raysplats.TraceOptions, not {type(options).__name__}")
+    if sh_degree is not None:
+        sh_degree = _whole_number("sh_degree", sh_degree)
     if render_mode not in _MODES:
         raise rs.UsageError(f"render_mode is one of {', '.join(_MODES)}, not '{render_mode}'")
-    if camera_model not in _CAMERA_MODELS:
+    if str(camera_model) not in _CAMERA_MODELS:
         _refuse(f"camera_model='{camera_model}'", f"known are {', '.join(_CAMERA_MODELS)}")
-    if far_plane < 1e10:
+    if not far_plane >= 1e10:
         _refuse("far_plane", "rays have no end; remove what is farther")
     if radius_clip != 0:
         _refuse("radius_clip", "every Gaussian that a ray meets counts")
@@ -176,7 +286,7 @@ def rasterization(
     if radial_coeffs is not None and camera_model != "fisheye":
         _refuse("radial_coeffs of this camera_model", "only 'fisheye' has them")
     if radial_coeffs is not None:
-        _require_shape("radial_coeffs", radial_coeffs, (views, 4))
+        require_shape("radial_coeffs", radial_coeffs, (views, 4))
     for name, given in (
         ("tangential_coeffs", tangential_coeffs),
         ("thin_prism_coeffs", thin_prism_coeffs),
@@ -192,34 +302,33 @@ def rasterization(
     inputs = (means, quats, scales, opacities, colors, viewmats)
     if needs_depth and torch.is_grad_enabled() and any(each.requires_grad for each in inputs):
         _refuse(f"gradients with render_mode='{render_mode}'", "those of depths are not computed; use torch.no_grad()")
-    per_view = colors.dim() == (3 if sh_degree is None else 4)
-    if sh_degree is None:
-        if colors.shape[-1] != 3:
-            _refuse("colors of other than 3 channels", f"these have {colors.shape[-1]}")
-        _require_shape("colors", colors, (views, count, 3) if per_view else (count, 3))
-    else:
-        bands = (sh_degree + 1) ** 2
-        if not 0 <= sh_degree <= 4 or colors.shape[-2] < bands:
-            raise rs.UsageError(f"sh_degree {sh_degree} needs {bands} coefficients, of degree 0 to 4")
-        shape = (count, colors.shape[-2], 3)
-        _require_shape("colors", colors, (views, *shape) if per_view else shape)
+    per_view = _check_colors(colors, sh_degree, count, views)
     if backgrounds is not None:
-        _require_shape("backgrounds", backgrounds, (views, 3))
-
-    renderer = _renderer(options, float(near_plane), needs_depth)
-    logits = torch.logit(opacities.clamp(_LEAST_OPACITY, _MOST_OPACITY)).contiguous()
-    shared = (means.contiguous(), quats.contiguous(), scales.log().contiguous(), logits)
-    pictures, alphas = [], []
+        require_shape("backgrounds", backgrounds, (views, 3))
+    cameras = []
     for i in range(views):
-        sh = _harmonics(colors[i] if per_view else colors, sh_degree).contiguous()
+        pose_matrix(f"viewmats[{i}]", viewmats[i])
         radial = None if radial_coeffs is None else radial_coeffs[i]
-        camera = _camera(Ks[i], width, height, camera_model, radial)
-        seen = renderer.render(camera, *shared, sh, viewmat=viewmats[i])
+        cameras.append(_camera(i, Ks[i], width, height, camera_model, radial))
+
+    renderer = _renderer(options, near_plane, needs_depth)
+    shared = (means.contiguous(), quats.contiguous(), _log_scales(scales), _logits(opacities))
+    lift = _lift(colors, sh_degree)
+    pictures, alphas = [], []
+    for i, camera in enumerate(cameras):
+        sh = _harmonics(colors[i] if per_view else colors, sh_degree, lift).contiguous()
+        try:
+            seen = renderer.render(camera, *shared, sh, viewmat=viewmats[i])
+        except rs.DataError:
+            _require_numbers(gaussians)  # which the tracer names by its own parameters
+            raise
         alpha = seen.rgba[..., 3:]
         layers = []
         if "RGB" in render_mode:
             rgb = seen.rgba[..., :3]
-            layers.append(rgb if backgrounds is None else rgb + (1 - alpha) * backgrounds[i])
+            if lift != 0:
+                rgb = rgb - lift * alpha
+            layers.append(rgb if backgrounds is None else rgb + (1 - alpha) * backgrounds[i].to(alpha))
         if needs_depth:
             depth = seen.expected_depth[..., None]
             layers.append(depth if "ED" in render_mode else depth * alpha)

@@ -10,13 +10,17 @@ Gradients of depths and of gradients are not computed, and the set and the order
 (docs/model.md).
 """
 
+import atexit
+import threading
 import typing
+import weakref
 
 import numpy as np
 import torch
 from torch.autograd.function import once_differentiable
 
 from . import _raysplats as rs
+from ._checks import pose_matrix, require_tensor
 from ._rasterization import rasterization
 
 __all__ = ["Renderer", "Rendering", "TracedRays", "rasterization"]
@@ -44,13 +48,25 @@ class TracedRays(typing.NamedTuple):
 
 def _array(tensor, name):
     """The numbers of a tensor, where they are if they are on the CPU."""
-    if not isinstance(tensor, torch.Tensor):
-        raise TypeError(f"{name} has to be a tensor of float32, not {type(tensor).__name__}")
-    if tensor.dtype != torch.float32:
-        raise TypeError(f"{name} is a tensor of {tensor.dtype}, but torch.float32 is needed: call float()")
+    require_tensor(name, tensor, torch.float32)
     if not tensor.is_contiguous():
         raise rs.UsageError(f"{name} is not contiguous: call contiguous()")
     return tensor.detach().cpu().numpy()
+
+
+def _require_kind(name, given, *kinds):
+    if not isinstance(given, kinds):
+        known = " or ".join("None" if each is type(None) else each.__name__ for each in kinds)
+        raise TypeError(f"{name} has to be {known}, not {type(given).__name__}")
+
+
+def _context(given):
+    if isinstance(given, rs.Context):
+        return given
+    try:
+        return rs.Context("" if given is None else given)
+    except TypeError:
+        raise TypeError(f"context has to be a Context or a device, not {type(given).__name__}") from None
 
 
 def _tensor(array, like):
@@ -83,13 +99,36 @@ def pose_gradient(viewmat, center, rotation):
     return out
 
 
+class _Pass:
+    """What a backward pass needs beside tensors. PyTorch frees no graph that is alive when the interpreter ends, so
+    that by then it has to have let go of what it keeps of the device."""
+
+    _living = weakref.WeakSet()
+    _living_lock = threading.Lock()
+
+    def __init__(self, renderer, source, ticket):
+        self.renderer, self.source, self.ticket = renderer, source, ticket
+        with self._living_lock:
+            self._living.add(self)
+
+    @classmethod
+    def end_all(cls):
+        with cls._living_lock:
+            living = list(cls._living)
+        for each in living:
+            each.renderer = each.source = None
+
+
+atexit.register(_Pass.end_all)
+
+
 class _View(torch.autograd.Function):
     @staticmethod
     def forward(ctx, renderer, camera, graded, viewmat, *parameters):
         needed = graded and any(ctx.needs_input_grad)
         picture, ticket = renderer._see(camera, viewmat, parameters, needed)
         # A copy: the camera may be moved on before the backward pass.
-        ctx.renderer, ctx.camera, ctx.ticket = renderer, camera.downscaled(1), ticket
+        ctx.kept = _Pass(renderer, camera.downscaled(1), ticket)
         ctx.save_for_backward(viewmat, *parameters)
         like = parameters[0]
         if picture.expected_depth is None:
@@ -102,10 +141,11 @@ class _View(torch.autograd.Function):
     @once_differentiable
     def backward(ctx, gradient, *_):
         viewmat, *parameters = ctx.saved_tensors
-        found = ctx.renderer._view_gradients(ctx.camera, viewmat, parameters, ctx.ticket, gradient)
+        kept = ctx.kept
+        found = kept.renderer._view_gradients(kept.source, viewmat, parameters, kept.ticket, gradient)
         pose = None
         if viewmat is not None and ctx.needs_input_grad[3]:
-            matrix = viewmat.detach().cpu().double().numpy()
+            matrix = pose_matrix("viewmat", viewmat)
             pose = torch.from_numpy(pose_gradient(matrix, found.camera_center, found.camera_rotation))
             pose = pose.to(viewmat)
         return (None, None, None, pose, *_parameter_gradients(found.parameters, parameters))
@@ -116,7 +156,7 @@ class _Rays(torch.autograd.Function):
     def forward(ctx, renderer, color_direction, graded, origins, directions, *parameters):
         needed = graded and any(ctx.needs_input_grad)
         traced, ticket = renderer._meet(color_direction, origins, directions, parameters, needed)
-        ctx.renderer, ctx.color_direction, ctx.ticket = renderer, color_direction, ticket
+        ctx.kept = _Pass(renderer, color_direction, ticket)
         ctx.save_for_backward(origins, directions, *parameters)
         depth, hits = _tensor(traced.expected_depth, origins), _tensor(traced.hits, origins)
         ctx.mark_non_differentiable(depth, hits)
@@ -126,8 +166,9 @@ class _Rays(torch.autograd.Function):
     @once_differentiable
     def backward(ctx, d_color, d_alpha, *_):
         origins, directions, *parameters = ctx.saved_tensors
-        found = ctx.renderer._ray_gradients(
-            ctx.color_direction, origins, directions, parameters, ctx.ticket, d_color, d_alpha
+        kept = ctx.kept
+        found = kept.renderer._ray_gradients(
+            kept.source, origins, directions, parameters, kept.ticket, d_color, d_alpha
         )
         return (
             None,
@@ -149,7 +190,9 @@ class Renderer:
 
     def __init__(self, context=None, options=None, *, mirrors=None):
         """context: a raysplats.Context, or what it takes for a device; options: raysplats.TraceOptions."""
-        self.context = context if isinstance(context, rs.Context) else rs.Context(context or "")
+        _require_kind("options", options, rs.TraceOptions, type(None))
+        _require_kind("mirrors", mirrors, rs.Mirrors, type(None))
+        self.context = _context(context)
         self.tracer = rs.Tracer(self.context, options, mirrors=mirrors)
         # What the device keeps, and the number of the pass that it is of, are used together by the thread that has
         # the lock of the context, as every call of the tracer does: a lock of our own beside it could be waited for
@@ -160,6 +203,7 @@ class Renderer:
     def render(self, camera, means, quaternions, log_scales, opacities, sh, *, viewmat=None):
         """A Rendering of what a raysplats.Camera sees; `viewmat`, a tensor (4, 4) from the world to the camera, takes
         the place of the camera's pose and gets gradients (tangent to rigid motions)."""
+        _require_kind("camera", camera, rs.Camera)
         graded = torch.is_grad_enabled()  # within apply() it never is
         seen = _View.apply(self, camera, graded, viewmat, means, quaternions, log_scales, opacities, sh)
         return Rendering(seen, None, None, None) if isinstance(seen, torch.Tensor) else Rendering(*seen)
@@ -183,9 +227,7 @@ class Renderer:
     def _posed(self, camera, viewmat):
         if viewmat is None:
             return camera
-        if not isinstance(viewmat, torch.Tensor) or viewmat.shape != (4, 4):
-            raise rs.UsageError("viewmat has to be a tensor of the shape (4, 4)")
-        matrix = viewmat.detach().cpu().double().numpy()
+        matrix = pose_matrix("viewmat", viewmat)
         posed = camera.downscaled(1)
         posed.rotation, posed.translation = matrix[:3, :3].tolist(), matrix[:3, 3].tolist()
         return posed

@@ -4,11 +4,15 @@
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <array>
+#include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 
 #include "bindings.hpp"
 #include "names.hpp"
@@ -82,6 +86,65 @@ Camera make_camera(int width,
   return camera;
 }
 
+using PhotoLensState = std::tuple<std::string,
+                                  Lens,
+                                  std::array<double, 3>,
+                                  double,
+                                  double,
+                                  std::array<double, 4>,
+                                  bool,
+                                  double,
+                                  double>;
+using CameraState = std::tuple<std::string,
+                               int,
+                               int,
+                               std::array<double, 4>,
+                               Matrix,
+                               Vector,
+                               std::string,
+                               Lens,
+                               std::optional<PhotoLensState>>;
+
+PhotoLensState state_of(const PhotoLens& l) {
+  return {name_of(kPhotoLensForms, l.form),
+          l.radial,
+          l.divisor,
+          l.p1,
+          l.p2,
+          l.prism,
+          l.decentred_last,
+          l.radius,
+          l.limit};
+}
+
+CameraState state_of(const Camera& c) {
+  std::optional<PhotoLensState> photo_lens;
+  if (c.lens) photo_lens = state_of(*c.lens);
+  return {c.name,
+          c.width,
+          c.height,
+          {c.fx, c.fy, c.cx, c.cy},
+          rotation(c),
+          from_glm(c.translation),
+          name_of(kCameraModels, c.model),
+          lens(c),
+          photo_lens};
+}
+
+Camera camera_of(const CameraState& state) {
+  const auto& [name, width, height, focal, rotation, translation, model, distortion, photo_lens] =
+      state;
+  Camera camera = make_camera(width, height, focal[0], focal[1], focal[2], focal[3], rotation,
+                              translation, model, distortion, name);
+  if (photo_lens) {
+    const auto& [form, radial, divisor, p1, p2, prism, decentred_last, radius, limit] = *photo_lens;
+    camera.lens = std::make_shared<const PhotoLens>(
+        PhotoLens{value_of(kPhotoLensForms, "the form of a lens", form), radial, divisor, p1, p2,
+                  prism, decentred_last, radius, limit});
+  }
+  return camera;
+}
+
 constexpr Matrix kIdentity{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 
 void bind_class(nb::module_& module) {
@@ -137,6 +200,11 @@ void bind_class(nb::module_& module) {
       .def(
           "downscaled", [](const Camera& c, double factor) { return downscaled(c, factor); },
           nb::arg("factor"), "The camera of the same view for a picture reduced by `factor`.")
+      .def("__getstate__", [](const Camera& c) { return state_of(c); })
+      .def(
+          "__setstate__",
+          [](Camera& self, const CameraState& state) { new (&self) Camera(camera_of(state)); },
+          nb::arg("state"))
       .def("__repr__", [](const Camera& c) {
         return fmt::format("<raysplats.Camera {}: {}x{}, fx {:.6g}>",
                            name_of(kCameraModels, c.model), c.width, c.height, c.fx);

@@ -4,12 +4,16 @@
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <tuple>
+#include <utility>
+#include <vector>
 
 #include "bindings.hpp"
 #include "images.hpp"
@@ -45,16 +49,82 @@ FloatView picture(const View& self) {
   return array_of(std::move(image));
 }
 
+/// Python knows no empty path: pathlib makes "." of it.
+std::optional<std::filesystem::path> path_or_none(const std::filesystem::path& path) {
+  return path.empty() ? std::nullopt : std::optional(path);
+}
+
+using Paths = std::array<std::optional<std::filesystem::path>, 3>;
+using ViewState = std::tuple<Camera, Camera, Paths, IndexArray, bool, bool, int, bool>;
+using DatasetState = std::tuple<std::string,
+                                std::filesystem::path,
+                                std::vector<View>,
+                                FloatArray,
+                                FloatArray,
+                                IndexArray,
+                                FloatArray,
+                                bool,
+                                std::array<double, 3>>;
+
+View view_of(const ViewState& state) {
+  const auto& [camera, source_camera, paths, points, mask_apart, mask_cuts, sample_bytes, test] =
+      state;
+  View out;
+  out.camera = camera;
+  out.source_camera = source_camera;
+  out.image_path = paths[0].value_or("");
+  out.mask_path = paths[1].value_or("");
+  out.depth_path = paths[2].value_or("");
+  out.points = numbers(points, "points", {kAny}).copy();
+  out.mask_apart = mask_apart;
+  out.mask_cuts = mask_cuts;
+  out.sample_bytes = sample_bytes;
+  out.test = test;
+  return out;
+}
+
+Dataset dataset_of(const DatasetState& state) {
+  const auto& [kind, root, views, positions, colors, tracks, errors, alpha_is_background, origin] =
+      state;
+  Dataset out;
+  out.kind = value_of(kDatasetKinds, "kind", kind);
+  out.root = root;
+  out.views = views;
+  out.points.positions = numbers(positions, "positions", {kAny, 3}).copy();
+  out.points.colors = numbers(colors, "colors", {kAny, 3}).copy();
+  out.points.track_lengths = numbers(tracks, "track_lengths", {kAny}).copy();
+  out.points.errors = numbers(errors, "errors", {kAny}).copy();
+  out.alpha_is_background = alpha_is_background;
+  out.origin = origin;
+  return out;
+}
+
 void bind_view(nb::module_& module) {
+  using Self = nb::handle_t<View>;
   nb::class_<View>(module, "View", "One photo and the camera that took it.")
       .def_ro("camera", &View::camera, "Of the picture that picture() gives.")
       .def_ro("image_path", &View::image_path)
-      .def_ro("mask_path", &View::mask_path, "Empty when there is none.")
+      .def_prop_ro(
+          "mask_path", [](const View& self) { return path_or_none(self.mask_path); },
+          "None when there is none.")
       .def_ro("source_camera", &View::source_camera, "Of the photo on disk, with its lens.")
       .def_ro("test", &View::test)
       .def("picture", &picture,
            "(height, width, 4): the photo, undistorted and resampled; alpha is mask or coverage, "
            "colour is straight.")
+      .def("__getstate__",
+           [](Self self) {
+             auto& v = nb::cast<View&>(self);
+             return std::tuple(v.camera, v.source_camera,
+                               Paths{path_or_none(v.image_path), path_or_none(v.mask_path),
+                                     path_or_none(v.depth_path)},
+                               view(self, v.points.data(), {v.points.size()}), v.mask_apart,
+                               v.mask_cuts, v.sample_bytes, v.test);
+           })
+      .def(
+          "__setstate__",
+          [](View& self, const ViewState& state) { new (&self) View(view_of(state)); },
+          nb::arg("state"))
       .def("__repr__",
            [](const View& self) { return fmt::format("<raysplats.View {}>", self.camera.name); });
 }
@@ -110,6 +180,21 @@ void bind_datasets(nb::module_& module) {
             return view(self, points.colors.data(), {points.size(), 3});
           },
           "(N, 3), in [0, 1]; a view.")
+      .def("__getstate__",
+           [](Self self) {
+             auto& d = nb::cast<Dataset&>(self);
+             PointCloud& points = d.points;
+             return std::tuple(
+                 name_of(kDatasetKinds, d.kind), d.root, nb::object(self.attr("views")),
+                 nb::object(self.attr("point_positions")), nb::object(self.attr("point_colors")),
+                 view(self, points.track_lengths.data(), {points.track_lengths.size()}),
+                 view(self, points.errors.data(), {points.errors.size()}), d.alpha_is_background,
+                 d.origin);
+           })
+      .def(
+          "__setstate__",
+          [](Dataset& self, const DatasetState& state) { new (&self) Dataset(dataset_of(state)); },
+          nb::arg("state"))
       .def("__len__", [](const Dataset& self) { return self.views.size(); });
 }
 

@@ -6,10 +6,12 @@
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <array>
 #include <optional>
+#include <tuple>
 
 #include "bindings.hpp"
 #include "names.hpp"
@@ -88,6 +90,24 @@ void bind_views(nb::class_<Gaussians>& type) {
                         {g.size(), static_cast<std::size_t>(sh_coefficients(g.sh_degree)), 3});
           },
           "(N, (sh_degree + 1)^2, 3), coefficients of spherical harmonics; a view.");
+}
+
+void bind_pickling(nb::class_<Gaussians>& type) {
+  using Arrays = std::tuple<FloatArray, FloatArray, FloatArray, FloatArray, FloatArray>;
+  type.def("__getstate__",
+           [](Self self) {
+             return Arrays{{self.attr("means")},
+                           {self.attr("quaternions")},
+                           {self.attr("log_scales")},
+                           {self.attr("opacities")},
+                           {self.attr("sh")}};
+           })
+      .def(
+          "__setstate__",
+          [](Gaussians& self, const Arrays& state) {
+            new (&self) Gaussians(std::apply(&gaussians_of, state));
+          },
+          nb::arg("state"));
 }
 
 using Triple = std::array<double, 3>;
@@ -201,6 +221,7 @@ void bind_gaussians(nb::module_& module) {
                            self.sh_degree);
       });
   bind_views(type);
+  bind_pickling(type);
 }
 
 }  // namespace raysplats::python

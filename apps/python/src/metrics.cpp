@@ -15,6 +15,7 @@
 #include "bindings.hpp"
 #include "images.hpp"
 #include "names.hpp"
+#include "pickling.hpp"
 #include "raysplats/evaluation.hpp"
 #include "signals.hpp"
 
@@ -50,9 +51,9 @@ EvaluationReport evaluate_renders(const nb::callable& render,
 }
 
 void bind_report(nb::module_& module) {
-  nb::class_<EvaluationMetrics>(module, "EvaluationMetrics",
-                                "Measures of one view, or their means over views.")
-      .def_ro("name", &EvaluationMetrics::name)
+  nb::class_<EvaluationMetrics> metrics(module, "EvaluationMetrics",
+                                        "Measures of one view, or their means over views.");
+  metrics.def_ro("name", &EvaluationMetrics::name)
       .def_ro("psnr", &EvaluationMetrics::psnr,
               "Decibels, over pixels not masked out; at most 100.")
       .def_ro("ssim", &EvaluationMetrics::ssim)
@@ -67,11 +68,16 @@ void bind_report(nb::module_& module) {
       .def_ro("center", &EvaluationMetrics::center, "Of the camera.")
       .def_ro("sharpness", &EvaluationMetrics::sharpness,
               "Of the photo, to compare with others of the scene.");
-  nb::class_<EvaluationReport>(module, "EvaluationReport")
-      .def_ro("mean", &EvaluationReport::mean)
+  using Metrics = EvaluationMetrics;
+  def_pickling(metrics, &Metrics::name, &Metrics::psnr, &Metrics::ssim, &Metrics::psnr_corrected,
+               &Metrics::psnr_aligned, &Metrics::psnr_all, &Metrics::lpips, &Metrics::picture,
+               &Metrics::center, &Metrics::sharpness);
+  nb::class_<EvaluationReport> report(module, "EvaluationReport");
+  report.def_ro("mean", &EvaluationReport::mean)
       .def_ro("images", &EvaluationReport::images)
       .def("table", &EvaluationReport::table)
       .def("json", &EvaluationReport::json);
+  def_pickling(report, &EvaluationReport::mean, &EvaluationReport::images);
 }
 
 }  // namespace

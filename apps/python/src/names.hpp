@@ -16,6 +16,7 @@
 #include "raysplats/rays.hpp"
 #include "raysplats/scene.hpp"
 #include "raysplats/trace_options.hpp"
+#include "scene/photo_lens.hpp"
 
 namespace raysplats::python {
 
@@ -49,6 +50,13 @@ inline constexpr std::array<Name<CameraModel>, 6> kCameraModels{
      {"equirectangular", CameraModel::kEquirectangular},
      {"orthographic", CameraModel::kOrthographic},
      {"photo-lens", CameraModel::kPhotoLens}}};
+/// In pickles alone.
+inline constexpr std::array<Name<PhotoLens::Form>, 5> kPhotoLensForms{
+    {{"perspective", PhotoLens::Form::kPerspective},
+     {"fisheye", PhotoLens::Form::kFisheye},
+     {"fov", PhotoLens::Form::kFov},
+     {"division", PhotoLens::Form::kDivision},
+     {"eucm", PhotoLens::Form::kEucm}}};
 inline constexpr std::array<Name<Split>, 3> kSplits{
     {{"train", Split::kTrain}, {"test", Split::kTest}, {"all", Split::kAll}}};
 inline constexpr std::array<Name<MaskUse>, 2> kMaskUses{

@@ -52,6 +52,12 @@ Mesh make_mesh(const FloatArray& positions,
   return mesh;
 }
 
+using MeshArrays = std::tuple<FloatArray,
+                              IndexArray,
+                              std::optional<IndexArray>,
+                              std::optional<FloatArray>,
+                              std::optional<FloatArray>>;
+
 void bind_mesh(nb::module_& module) {
   using Self = nb::handle_t<Mesh>;
   const auto held = [](nb::handle self) -> Mesh& { return nb::cast<Mesh&>(self); };
@@ -85,7 +91,22 @@ void bind_mesh(nb::module_& module) {
           [held](Self self) {
             return view(self, held(self).materials.data(), {held(self).materials.size()});
           },
-          "(T,), indices of the scene's materials.");
+          "(T,), indices of the scene's materials.")
+      .def("__getstate__",
+           [held](Self self) {
+             Mesh& mesh = held(self);
+             return std::tuple(nb::object(self.attr("positions")),
+                               nb::object(self.attr("triangles")),
+                               nb::object(self.attr("materials")),
+                               view(self, mesh.normals.data(), {mesh.normals.size() / 3, 3}),
+                               view(self, mesh.uvs.data(), {mesh.uvs.size() / 2, 2}));
+           })
+      .def(
+          "__setstate__",
+          [](Mesh& self, const MeshArrays& state) {
+            new (&self) Mesh(std::apply(&make_mesh, state));
+          },
+          nb::arg("state"));
 }
 
 void bind_material(nb::module_& module) {

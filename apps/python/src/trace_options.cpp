@@ -56,6 +56,9 @@ void bind_trace_options(nb::module_& module) {
   type.def_static(
           "load", [](const std::filesystem::path& path) { return read_ply_options(path); },
           nb::arg("path"), "The options in the header of a PLY that raysplats wrote, else None.")
+      .def_static("peak_order", &peak_order,
+                  "What models of other programs are shown by: the order of hits of rasterisers, "
+                  "and ellipsoids no larger than what they show.")
       .def_rw("quantile", &TraceOptions::quantile,
               "A ray meets a Gaussian when the squared whitened distance is at most this.")
       .def_rw("min_transmittance", &TraceOptions::min_transmittance, "A ray stops below this.")
@@ -73,6 +76,9 @@ void bind_trace_options(nb::module_& module) {
       .def_rw("packet_width", &TraceOptions::packet_width,
               "Rays of a packet; 0 = the device's own.")
       .def_rw("deterministic", &TraceOptions::deterministic, "The same bits every time.")
+      .def_rw("raise_clamped", &TraceOptions::raise_clamped,
+              "Where a colour is clamped at 0, gradients that would raise it pass all the same: "
+              "what `raysplats train` does.")
       .def_rw("launch_budget_ms", &TraceOptions::launch_budget_ms,
               "Time of one launch; 0 = unbounded, -1 = the device's default.")
       .def_rw("memory_budget", &TraceOptions::memory_budget,

@@ -17,6 +17,7 @@
 
 #include "bindings.hpp"
 #include "context.hpp"
+#include "pickling.hpp"
 #include "raysplats/error.hpp"
 #include "run/train_config.hpp"
 #include "run/train_option_table.hpp"
@@ -128,8 +129,9 @@ bool step(HeldTrainer& self, std::int64_t count, const Callback& on_step) {
 }
 
 void bind_records(nb::module_& module) {
-  nb::class_<EvaluationRow>(module, "EvaluationRow", "Mean over the test views at one iteration.")
-      .def_ro("iteration", &EvaluationRow::iteration)
+  nb::class_<EvaluationRow> row(module, "EvaluationRow",
+                                "Mean over the test views at one iteration.");
+  row.def_ro("iteration", &EvaluationRow::iteration)
       .def_ro("training_seconds", &EvaluationRow::training_seconds)
       .def_ro("psnr", &EvaluationRow::psnr, "Decibels.")
       .def_ro("ssim", &EvaluationRow::ssim)
@@ -138,21 +140,30 @@ void bind_records(nb::module_& module) {
       .def_ro("psnr_corrected", &EvaluationRow::psnr_corrected)
       .def_ro("psnr_all", &EvaluationRow::psnr_all)
       .def_ro("psnr_aligned", &EvaluationRow::psnr_aligned);
-  nb::class_<TrainSummary>(module, "TrainSummary")
-      .def_ro("iterations", &TrainSummary::iterations)
+  def_pickling(row, &EvaluationRow::iteration, &EvaluationRow::training_seconds,
+               &EvaluationRow::psnr, &EvaluationRow::ssim, &EvaluationRow::views,
+               &EvaluationRow::gaussians, &EvaluationRow::psnr_corrected, &EvaluationRow::psnr_all,
+               &EvaluationRow::psnr_aligned);
+  nb::class_<TrainSummary> summary(module, "TrainSummary");
+  summary.def_ro("iterations", &TrainSummary::iterations)
       .def_ro("gaussians", &TrainSummary::gaussians)
       .def_ro("loss", &TrainSummary::loss, "Of the last view reported.")
       .def_ro("training_seconds", &TrainSummary::training_seconds)
       .def_ro("evaluation_seconds", &TrainSummary::evaluation_seconds)
       .def_ro("kernel_build_seconds", &TrainSummary::kernel_build_seconds)
       .def_ro("evaluations", &TrainSummary::evaluations);
-  nb::class_<TrainProgress>(module, "TrainProgress", "Where a run is after a step.")
-      .def_ro("iteration", &TrainProgress::iteration, "Completed.")
+  def_pickling(summary, &TrainSummary::iterations, &TrainSummary::gaussians, &TrainSummary::loss,
+               &TrainSummary::training_seconds, &TrainSummary::evaluation_seconds,
+               &TrainSummary::kernel_build_seconds, &TrainSummary::evaluations);
+  nb::class_<TrainProgress> progress(module, "TrainProgress", "Where a run is after a step.");
+  progress.def_ro("iteration", &TrainProgress::iteration, "Completed.")
       .def_ro("iterations", &TrainProgress::iterations, "Of the whole run.")
       .def_ro("gaussians", &TrainProgress::gaussians);
-  nb::class_<TrainLoss>(module, "TrainLoss", "The view that the last step was made with.")
-      .def_ro("total", &TrainLoss::total)
-      .def_ro("psnr", &TrainLoss::psnr, "Decibels.");
+  def_pickling(progress, &TrainProgress::iteration, &TrainProgress::iterations,
+               &TrainProgress::gaussians);
+  nb::class_<TrainLoss> loss(module, "TrainLoss", "The view that the last step was made with.");
+  loss.def_ro("total", &TrainLoss::total).def_ro("psnr", &TrainLoss::psnr, "Decibels.");
+  def_pickling(loss, &TrainLoss::total, &TrainLoss::psnr);
 }
 
 void bind_options(nb::module_& module) {
@@ -173,7 +184,14 @@ void bind_options(nb::module_& module) {
             return names;
           },
           "The name of every key.")
-      .def("to_toml", &to_toml, "A configuration file with every key and what it means.");
+      .def("to_toml", &to_toml, "A configuration file with every key and what it means.")
+      .def("__getstate__", &to_toml)
+      .def(
+          "__setstate__",
+          [](TrainOptions& self, const std::string& state) {
+            new (&self) TrainOptions(parse_train_config(state));
+          },
+          nb::arg("state"));
 }
 
 }  // namespace
