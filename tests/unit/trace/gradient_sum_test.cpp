@@ -195,7 +195,9 @@ TEST_CASE("every way of adding gradients gives the same, and all but atomics the
   for (const Packet& packet : packets({1, 16}, {32}))
     cases.emplace_back(packet, reference::random_scene(1500, 31, 1));
   cases.emplace_back(Packet{PacketShape::kGroup, 32}, crowded_scene(60));
-  for (const auto& [packet, model] : cases) {
+  for (const auto& given : cases) {
+    const Packet packet = given.first;
+    const Gaussians& model = given.second;
     CAPTURE(packet);
     CAPTURE(model.size());
     TraceOptions options = packet.over({});
