@@ -102,7 +102,7 @@ __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void count_digits(
 }
 
 // Each of a digit's counts becomes the sum of those of the groups before, and totals[digit] that of
-// all. Launch: a work-group per digit, or one of one work-item.
+// all. Launch: a work-group per digit; of one work-item any number, which share the digits.
 __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void scan_counts(__global uint* counts,
                                                                              __global uint* totals,
                                                                              uint groups) {
@@ -120,7 +120,7 @@ __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void scan_counts(__g
   }
   if (lane == 0) totals[get_group_id(0)] = running;
 #else
-  for (uint d = 0; d < RS_DIGITS; ++d) {
+  for (uint d = get_group_id(0); d < RS_DIGITS; d += get_num_groups(0)) {
     __global uint* row = counts + d * groups;
     uint running = 0;
     for (uint g = 0; g < groups; ++g) {

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "raysplats/error.hpp"
 
 namespace raysplats {
@@ -95,7 +97,8 @@ void RadixSort::pass(const Ends& ends,
   totals_.ensure(*context_, kDigits, "sort digit totals");
   count_digits_[from_pairs].launch(range, ends.keys, ends.pairs, counts_, live, limit, least,
                                    shift);
-  const std::size_t scans = shape_.group_size > 1 ? kDigits : 1;
+  const std::size_t scans =
+      shape_.group_size > 1 ? kDigits : std::min(kDigits, shape_.used_groups(kDigits * groups));
   scan_counts_.launch(Range::linear(scans * shape_.group_size, shape_.group_size), counts_, totals_,
                       static_cast<std::uint32_t>(groups));
   scatter_[from_pairs][to_pairs].launch(range, ends.keys, ends.values, ends.pairs, counts_, totals_,

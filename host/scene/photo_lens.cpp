@@ -168,7 +168,7 @@ PhotoLens measured(PhotoLens lens, double widest, const std::string& what) {
   const double end = std::min(angle_of(lens, widest), lens.limit - 1e-4);
   // Where the radius stops growing, however little is added to it makes the image turn over in some
   // direction just before: there the lens ends. Nearer to the middle its parameters are wrong.
-  constexpr double kLeastShare = 0.5;
+  constexpr double kLeastShare = 0.9;
   const double single = single_until(lens, end);
   if (single < end) lens.limit = single;
   if (!(lens.limit >= kLeast && single >= kLeastShare * end)) {

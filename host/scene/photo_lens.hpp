@@ -42,7 +42,7 @@ struct PhotoLens {
 /// (kPerspective and kFov: 89.9 degrees), and within `widest` (image radius) before what is added
 /// makes places be seen twice. Throws DataError, which begins with `what` ("the camera 3"), for
 /// parameters that no lens has: an image that does not grow from its middle, and one in which
-/// places are seen twice in the inner half of these angles.
+/// places are seen twice before nine tenths of these angles.
 PhotoLens measured(PhotoLens lens, double widest, const std::string& what);
 
 /// Distance of the farthest corner from the axis, in normalised image coordinates.

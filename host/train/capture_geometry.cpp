@@ -68,6 +68,11 @@ double median_turn(const std::vector<glm::dvec3>& axes, const std::vector<glm::d
   return median(std::move(turns));
 }
 
+// From its axis to the middle of the nearer side, radians.
+double half_angle(const Camera& camera) {
+  return std::atan(0.5 * std::min(camera.width / camera.fx, camera.height / camera.fy));
+}
+
 bool sees_far_around(const Camera& camera) {
   return camera.model == CameraModel::kEquirectangular || camera.model == CameraModel::kFisheye;
 }
@@ -162,6 +167,7 @@ double motion_extent(std::span<const Camera> cameras, double extent) {
 bool look_elsewhere(std::span<const Camera> held_out, std::span<const Camera> trained) {
   constexpr std::size_t kLeastHeldOut = 3;
   constexpr double kLeastTurn = glm::radians(15.0);
+  constexpr double kBeyond = 1.01;     // what neighbours see: crops that just meet do not miss any
   constexpr double kTimesUsual = 5.0;  // without rigs captures have up to 1.8
   if (held_out.size() < kLeastHeldOut || trained.size() < 2) return false;
   if (std::any_of(held_out.begin(), held_out.end(), sees_far_around) ||
@@ -169,7 +175,11 @@ bool look_elsewhere(std::span<const Camera> held_out, std::span<const Camera> tr
     return false;
   const std::vector<glm::dvec3> axes = axes_of(trained);
   const double turn = median_turn(axes_of(held_out), axes);
-  return turn > kLeastTurn && turn > kTimesUsual * median_turn(axes, axes);
+  std::vector<double> halves;
+  halves.reserve(trained.size());
+  for (const Camera& camera : trained) halves.push_back(half_angle(camera));
+  return turn > std::max(kLeastTurn, kBeyond * median(std::move(halves))) &&
+         turn > kTimesUsual * median_turn(axes, axes);
 }
 
 double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point) {

@@ -124,6 +124,7 @@ def test_data_sets(context, folder, tmp_path):
     dataset = rs.Dataset.load(folder)
     for each in assert_copies(dataset):
         assert np.array_equal(each.views[3].picture(), dataset.views[3].picture())
+        assert each.test_every == dataset.test_every == 8
     assert_copies(dataset.views[0])
     assert dataset.views[0].mask_path is None
     report = rs.evaluate(lambda camera: np.zeros((camera.height, camera.width, 3), np.float32), dataset, max_views=2)

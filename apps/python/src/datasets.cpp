@@ -64,7 +64,8 @@ using DatasetState = std::tuple<std::string,
                                 IndexArray,
                                 FloatArray,
                                 bool,
-                                std::array<double, 3>>;
+                                std::array<double, 3>,
+                                int>;
 
 View view_of(const ViewState& state) {
   const auto& [camera, source_camera, paths, points, mask_apart, mask_cuts, sample_bytes, test] =
@@ -84,8 +85,8 @@ View view_of(const ViewState& state) {
 }
 
 Dataset dataset_of(const DatasetState& state) {
-  const auto& [kind, root, views, positions, colors, tracks, errors, alpha_is_background, origin] =
-      state;
+  const auto& [kind, root, views, positions, colors, tracks, errors, alpha_is_background, origin,
+               test_every] = state;
   Dataset out;
   out.kind = value_of(kDatasetKinds, "kind", kind);
   out.root = root;
@@ -96,6 +97,7 @@ Dataset dataset_of(const DatasetState& state) {
   out.points.errors = numbers(errors, "errors", {kAny}).copy();
   out.alpha_is_background = alpha_is_background;
   out.origin = origin;
+  out.test_every = test_every;
   return out;
 }
 
@@ -145,6 +147,8 @@ void bind_datasets(nb::module_& module) {
           "kind", [](const Dataset& self) { return name_of(kDatasetKinds, self.kind); },
           "'colmap', 'blender', 'nerfstudio', 'llff' or 'polycam'.")
       .def_ro("root", &Dataset::root)
+      .def_ro("test_every", &Dataset::test_every,
+              "Every n-th view is held out; 0 where files name those, or none is.")
       .def_ro("origin", &Dataset::origin,
               "What was taken off all positions of the files: 0, but near the cameras where the "
               "scene lies far away.")
@@ -189,7 +193,7 @@ void bind_datasets(nb::module_& module) {
                  nb::object(self.attr("point_positions")), nb::object(self.attr("point_colors")),
                  view(self, points.track_lengths.data(), {points.track_lengths.size()}),
                  view(self, points.errors.data(), {points.errors.size()}), d.alpha_is_background,
-                 d.origin);
+                 d.origin, d.test_every);
            })
       .def(
           "__setstate__",

@@ -297,6 +297,8 @@ TEST_CASE("lenses that cannot be inverted are refused by one sentence") {
   CHECK(contains(error_of(10, "THIN_PRISM_FISHEYE", prism), several));
   CHECK(contains(error_of(10, "THIN_PRISM_FISHEYE", {80, 80, 80, 60, -1e9, 0, 0, 0, 0, 0, 0, 0}),
                  several));
+  const Numbers tangential{60, 60, 80, 60, 0, 0, 0.15, 0, 0, 0, 0, 0};  // folds at two thirds
+  CHECK(contains(error_of(10, "THIN_PRISM_FISHEYE", tangential), several));
   // A lens that ends within the photo leaves its corners unknown.
   const LensCase ends{
       10, "THIN_PRISM_FISHEYE", {80, 80, 80, 60, -0.4, 0, 0, 0, 0, 0, 0, 0}, thin_prism,

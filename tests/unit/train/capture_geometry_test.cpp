@@ -80,6 +80,10 @@ TEST_CASE("held-out cameras look elsewhere where counting holds out one lens of 
   // Every second lens, each 45 degrees from its neighbours.
   CHECK(told(rig, 2));
   CHECK(told(rig_of_eight(400), 8));
+  // Lenses so wide that their neighbours see what a held-out one looks at.
+  std::vector<Camera> overlapping = rig;
+  for (Camera& camera : overlapping) camera.fx = camera.fy = 9;
+  CHECK_FALSE(told(overlapping, 8));
   // Two held-out photos may be odd ones.
   CHECK_FALSE(told(rig_of_eight(2), 8));
   // Wherever its axis is, such a lens sees what the others do.
