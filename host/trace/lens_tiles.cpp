@@ -24,10 +24,8 @@ constexpr RsLensFaces kFaces{{{1, 0, 0, 0, 1, 0, 0, 0, 1},
                               {-1, 0, 0, 0, 1, 0, 0, 0, -1}}};
 
 bool same_lens(const Camera& a, const Camera& b) {
-  const Distortion &d = a.distortion, &e = b.distortion;
   return a.model == b.model && a.width == b.width && a.height == b.height && a.fx == b.fx &&
-         a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && d.k1 == e.k1 && d.k2 == e.k2 &&
-         d.k3 == e.k3 && d.k4 == e.k4 && d.p1 == e.p1 && d.p2 == e.p2;
+         a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.distortion == b.distortion;
 }
 
 void grow(std::array<float, 4>& box, const RsLensTile& tile) {

@@ -53,15 +53,16 @@ std::vector<glm::dvec3> axes_of(std::span<const Camera> cameras) {
   return out;
 }
 
-// The median angle from an axis to the nearest one of `others`, radians; of the same axes to the
-// nearest other one.
-double median_turn(const std::vector<glm::dvec3>& axes, const std::vector<glm::dvec3>& others) {
-  const bool same = &axes == &others;
+// The median angle from an axis to the nearest one of `others`, radians. `own`: these are the axes
+// themselves, of which each one looks for another.
+double median_turn(const std::vector<glm::dvec3>& axes,
+                   const std::vector<glm::dvec3>& others,
+                   bool own) {
   std::vector<double> turns;
   for (const std::size_t i : even_choice(axes.size(), kMostAsking)) {
     double cosine = -1;
     for (std::size_t j = 0; j < others.size(); ++j) {
-      if (!same || j != i) cosine = std::max(cosine, glm::dot(axes[i], others[j]));
+      if (!own || j != i) cosine = std::max(cosine, glm::dot(axes[i], others[j]));
     }
     turns.push_back(std::acos(std::min(cosine, 1.0)));
   }
@@ -174,12 +175,12 @@ bool look_elsewhere(std::span<const Camera> held_out, std::span<const Camera> tr
       std::any_of(trained.begin(), trained.end(), sees_far_around))
     return false;
   const std::vector<glm::dvec3> axes = axes_of(trained);
-  const double turn = median_turn(axes_of(held_out), axes);
+  const double turn = median_turn(axes_of(held_out), axes, false);
   std::vector<double> halves;
   halves.reserve(trained.size());
   for (const Camera& camera : trained) halves.push_back(half_angle(camera));
   return turn > std::max(kLeastTurn, kBeyond * median(std::move(halves))) &&
-         turn > kTimesUsual * median_turn(axes, axes);
+         turn > kTimesUsual * median_turn(axes, axes, true);
 }
 
 double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point) {

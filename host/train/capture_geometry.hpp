@@ -46,10 +46,9 @@ double motion_extent(std::span<const Camera> cameras, double extent);
 /// Whether the held-out cameras look where the trained ones do not, although these look where
 /// others of them do: the median angle from a held-out axis to the nearest trained one is above 15
 /// degrees, beyond what a trained camera sees, and above five times that from a trained axis to the
-/// nearest other one. No for less than
-/// three held-out cameras, which may be odd ones, and where any lens sees far beyond its axis
-/// (fisheyes, panoramas). Of many cameras some hundred, evenly spread, are compared with all
-/// others.
+/// nearest other one. No for less than three held-out cameras, which may be odd ones, and where any
+/// lens sees far beyond its axis (fisheyes, panoramas). Of many cameras some hundred, evenly
+/// spread, are compared with all others.
 bool look_elsewhere(std::span<const Camera> held_out, std::span<const Camera> trained);
 
 /// From the point to the nearest camera; infinite without cameras.

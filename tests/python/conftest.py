@@ -1,8 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
+import concurrent.futures
+import sys
+
 import numpy as np
 import pytest
 
 import raysplats
+
+# Of the confidence ellipsoids.
+QUANTILE = 11.3449
+# Of the largest number of a class of parameters.
+TOLERANCE = 1e-4
 
 
 @pytest.fixture(scope="session")
@@ -29,3 +37,25 @@ def as_gaussians(arrays):
 @pytest.fixture
 def arrays():
     return random_arrays()
+
+
+@pytest.fixture
+def hasty_threads():
+    """The interpreter changes threads as often as it can."""
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(usual)
+
+
+def assert_threads_find(calls, expected, rounds=25):
+    """Functions of tensors that are called again and again, each in a thread of its own, find what they find alone."""
+
+    def again(call):
+        return [call() for _ in range(rounds)]
+
+    with concurrent.futures.ThreadPoolExecutor(len(calls)) as threads:
+        found = [each.result() for each in [threads.submit(again, call) for call in calls]]
+    for several, one in zip(found, expected):
+        for each in several:
+            assert each.allclose(one, rtol=1e-4, atol=1e-4 * one.abs().max())
