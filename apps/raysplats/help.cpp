@@ -19,11 +19,11 @@ constexpr std::array kRare{
     "undistort",    "test-every",      "path-transform", "path-data"};
 /// What it shows of the hundred options of `train`.
 constexpr std::array kTraining{
-    "help",          "help-all",  "data",           "output",   "resume",     "time",
-    "quality",       "overwrite", "view",           "device",   "config",     "iterations",
-    "seed",          "downscale", "masks",          "alpha",    "background", "mirror",
-    "bounds",        "sh-degree", "exposure",       "poses",    "hit-order",  "strategy",
-    "max-gaussians", "save-at",   "validate-views", "patience", "eval-at"};
+    "help",     "help-all",      "data",      "output",         "resume",   "time",
+    "quality",  "overwrite",     "view",      "device",         "config",   "iterations",
+    "seed",     "downscale",     "masks",     "alpha",          "borders",  "background",
+    "mirror",   "bounds",        "sh-degree", "exposure",       "poses",    "hit-order",
+    "strategy", "max-gaussians", "save-at",   "validate-views", "patience", "eval-at"};
 
 template <std::size_t N>
 bool named(const CLI::Option& option, const std::array<const char*, N>& names) {

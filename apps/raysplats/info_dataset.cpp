@@ -65,6 +65,8 @@ Json describe(const Dataset& dataset) {
           {"alpha_is_background", dataset.alpha_is_background},
           {"masks", std::count_if(dataset.views.begin(), dataset.views.end(),
                                   [](const View& view) { return !view.mask_path.empty(); })},
+          {"borders", std::count_if(dataset.views.begin(), dataset.views.end(),
+                                    [](const View& view) { return view.border != nullptr; })},
           {"points", dataset.points.size()}};
 }
 
@@ -95,6 +97,10 @@ void print_dataset(const Json& dataset) {
   }
   if (const auto masks = dataset["masks"].get<std::size_t>(); masks > 0) {
     fmt::print("masks            {}: what is black there does not count\n", masks);
+  }
+  if (const auto borders = dataset["borders"].get<std::size_t>(); borders > 0) {
+    fmt::print("black borders    {}: the same in all photos of a size, and do not count\n",
+               counted(borders, "photo"));
   }
   if (dataset["alpha_is_background"].get<bool>()) {
     fmt::print("transparency     photos are cut out: what is transparent is background\n");

@@ -140,7 +140,7 @@ CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags, const std::string& 
   app.add_option("--split", flags.split, split)
       ->group(group)
       ->check(one_of({"test", "train", "all"}));
-  for (const char* name : {"downscale", "test-every", "undistort", "masks", "alpha"})
+  for (const char* name : {"downscale", "test-every", "undistort", "masks", "alpha", "borders"})
     add_setting(app, flags.settings, name)->group(group);
   return data;
 }
@@ -153,11 +153,12 @@ Split DataFlags::chosen_split() const {
 
 void DataFlags::check_used(bool orbit) const {
   const bool chosen = split || settings.has("test-every");
-  if (data.empty() &&
-      (chosen || settings.has("undistort") || settings.has("masks") || settings.has("alpha"))) {
+  const bool about_photos = settings.has("undistort") || settings.has("masks") ||
+                            settings.has("alpha") || settings.has("borders");
+  if (data.empty() && (chosen || about_photos)) {
     throw UsageError(
-        "--split, --test-every, --undistort, --masks and --alpha are about the views of a data "
-        "set: add --data DATASET");
+        "--split, --test-every, --undistort, --masks, --alpha and --borders are about the views of "
+        "a data set: add --data DATASET");
   }
   if (orbit && chosen) {
     throw UsageError(

@@ -63,6 +63,11 @@ void add_data_options(OptionTable& table, DatasetOptions& options) {
       "cutout "
       "(background) or auto (cutout where most photos have something transparent, but for a border "
       "that is the same in all)");
+  table.choice<BorderUse>(
+      "borders", options.borders, {{"auto", BorderUse::kAuto}, {"keep", BorderUse::kKeep}},
+      "black borders that all photos have, as the bars of a video or around the circle of a "
+      "fisheye: auto (they count neither in the loss nor in metrics) or keep (they are a part of "
+      "the scene)");
   add_origin_option(table, options);
 }
 

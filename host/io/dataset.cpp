@@ -21,6 +21,7 @@
 #include "io/find_image.hpp"
 #include "io/frame_lists.hpp"
 #include "io/llff.hpp"
+#include "io/photo_border.hpp"
 #include "io/photo_folder.hpp"
 #include "io/photo_mask.hpp"
 #include "io/photo_transparency.hpp"
@@ -236,6 +237,18 @@ bool shows_cut_outs(const Dataset& dataset, AlphaUse use) {
   return found == io::Transparency::kCutOut;
 }
 
+void leave_out_borders(Dataset& dataset) {
+  io::find_borders(dataset.views);
+  const auto has_border = [](const View& view) { return view.border != nullptr; };
+  const auto first = std::find_if(dataset.views.begin(), dataset.views.end(), has_border);
+  if (first == dataset.views.end()) return;
+  spdlog::info(
+      "{} of {} photos have the same black border, of {:.0f} % of the pixels of {}, as the bars of "
+      "a video: it does not count (with borders = keep it is a part of the scene)",
+      std::count_if(dataset.views.begin(), dataset.views.end(), has_border), dataset.views.size(),
+      std::max(1.0, 100.0 * io::hidden_share(*first->border)), first->image_path.string());
+}
+
 /// What nerfstudio makes of a capture has COLMAP's model in a folder of its own. Its file says more
 /// (masks, depth maps, lists), and where it has points there is nothing that the model has more.
 bool goes_before(const fs::path& transforms, const fs::path& root, const fs::path& model) {
@@ -338,6 +351,8 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
                  dataset.views.size(), first->mask_path.string(),
                  ignores ? "does not count" : "is background");
   }
+  if (options.borders == BorderUse::kAuto && !dataset.alpha_is_background)
+    leave_out_borders(dataset);
   return dataset;
 }
 

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/photo_orientation.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <variant>
 
 #include "io/image_file.hpp"
+#include "raysplats/error.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -54,6 +57,22 @@ RawImage turned_upright(const RawImage& raw, const std::filesystem::path& path) 
 
 RawImage as_stored(const RawImage& raw, const std::filesystem::path& path) {
   return quarter_turned(raw, image_orientation(path) != kClockwise);
+}
+
+StoredPhoto read_photo(const View& view) {
+  const Camera& camera = view.source_camera;
+  StoredPhoto out{read_raw_image(view.image_path)};
+  // Sizes that differ by a turn alone are of set_cameras() (photo_views.cpp).
+  const bool across = out.raw.width != out.raw.height && out.raw.width == camera.height &&
+                      out.raw.height == camera.width;
+  out.turned = across && lies_on_its_side(view.image_path);
+  if (out.turned) out.raw = turned_upright(out.raw, view.image_path);
+  if (out.raw.width != camera.width || out.raw.height != camera.height) {
+    throw DataError(fmt::format(
+        "The image {} has {} x {} pixels now, but {} x {} when the data set was opened",
+        view.image_path.string(), out.raw.width, out.raw.height, camera.width, camera.height));
+  }
+  return out;
 }
 
 }  // namespace raysplats::io

@@ -5,6 +5,7 @@
 
 #include "io/image_codec.hpp"
 #include "raysplats/camera.hpp"
+#include "raysplats/dataset.hpp"
 
 namespace raysplats::io {
 
@@ -24,5 +25,14 @@ RawImage turned_upright(const RawImage& raw, const std::filesystem::path& path);
 
 /// The other way round: a picture that was made of it upright, turned as it is stored.
 RawImage as_stored(const RawImage& raw, const std::filesystem::path& path);
+
+/// The photo of a view, as its camera has it.
+struct StoredPhoto {
+  RawImage raw;
+  bool turned = false;  ///< turned_upright()
+};
+
+/// Throws DataError for what read_raw_image() cannot read, and for another size than the camera's.
+StoredPhoto read_photo(const View& view);
 
 }  // namespace raysplats::io

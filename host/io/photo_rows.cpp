@@ -80,6 +80,29 @@ class DecodedRows : public PhotoPixels {
   PhotoColors colors_;
 };
 
+class BorderedRows : public PhotoPixels {
+ public:
+  BorderedRows(std::unique_ptr<PhotoPixels> source, std::shared_ptr<const PhotoBorder> border)
+      : PhotoPixels(source->width(), source->height()),
+        source_(std::move(source)),
+        border_(std::move(border)) {}
+
+  void pixel(int x, int y, float* rgba) override {
+    source_->pixel(x, y, rgba);
+    if (border_->hides(x, y)) rgba[3] = 0.0f;
+  }
+  void row(int y, float* rgba) override {
+    source_->row(y, rgba);
+    for (int x = 0; x < width(); ++x, rgba += kChannels) {
+      if (border_->hides(x, y)) rgba[3] = 0.0f;
+    }
+  }
+
+ private:
+  std::unique_ptr<PhotoPixels> source_;
+  std::shared_ptr<const PhotoBorder> border_;
+};
+
 class MaskRows : public PhotoPixels {
  public:
   MaskRows(const MaskPlane& mask, int width, int height)
@@ -346,6 +369,11 @@ std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image,
         return std::make_unique<DecodedRows<T>>(image, numbers, mask, colors);
       },
       image.numbers);
+}
+
+std::unique_ptr<PhotoPixels> bordered_rows(std::unique_ptr<PhotoPixels> source,
+                                           std::shared_ptr<const PhotoBorder> border) {
+  return std::make_unique<BorderedRows>(std::move(source), std::move(border));
 }
 
 std::unique_ptr<PhotoPixels> mask_rows(const MaskPlane& mask, int width, int height) {

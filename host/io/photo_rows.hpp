@@ -6,6 +6,7 @@
 
 #include "io/image_codec.hpp"
 #include "raysplats/camera.hpp"
+#include "raysplats/dataset.hpp"
 
 namespace raysplats::io {
 
@@ -57,6 +58,9 @@ bool is_black(const RawImage& mask);
 std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image,
                                           const MaskPlane* mask,
                                           PhotoColors colors = {});
+/// Alpha 0 in the border.
+std::unique_ptr<PhotoPixels> bordered_rows(std::unique_ptr<PhotoPixels> source,
+                                           std::shared_ptr<const PhotoBorder> border);
 /// White whose alpha is the mask, at the size of a photo.
 std::unique_ptr<PhotoPixels> mask_rows(const MaskPlane& mask, int width, int height);
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/view_rows.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <filesystem>
@@ -12,7 +10,6 @@
 
 #include "io/image_file.hpp"
 #include "io/photo_orientation.hpp"
-#include "raysplats/error.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -39,26 +36,22 @@ PhotoColors colors_of(const RawImage& raw, const std::filesystem::path& path) {
 
 }  // namespace
 
-ViewRows::ViewRows(const View& view) : raw_(read_raw_image(view.image_path)) {
-  // Sizes that differ by a turn alone are of set_cameras() (dataset.cpp).
-  const bool across = raw_.width != raw_.height && raw_.width == view.source_camera.height &&
-                      raw_.height == view.source_camera.width;
-  const bool turned = across && lies_on_its_side(view.image_path);
-  if (turned) raw_ = turned_upright(raw_, view.image_path);
-  if (raw_.width != view.source_camera.width || raw_.height != view.source_camera.height) {
-    throw DataError(
-        fmt::format("The image {} has {} x {} pixels now, but {} x {} when the data set was opened",
-                    view.image_path.string(), raw_.width, raw_.height, view.source_camera.width,
-                    view.source_camera.height));
-  }
+ViewRows::ViewRows(const View& view) {
+  StoredPhoto photo = read_photo(view);
+  raw_ = std::move(photo.raw);
   const PhotoColors colors = colors_of(raw_, view.image_path);
   unchanged_ = !colors.light && !colors.associated;
   const bool masked = !view.mask_path.empty();
   if (masked) {
-    mask_ = mask_plane(mask_of_photo(view, turned));
+    mask_ = mask_plane(mask_of_photo(view, photo.turned));
     unchanged_ = false;
   }
-  rows_ = fitted(decoded_rows(raw_, masked ? &mask_ : nullptr, colors), view);
+  auto pixels = decoded_rows(raw_, masked ? &mask_ : nullptr, colors);
+  if (view.border) {
+    pixels = bordered_rows(std::move(pixels), view.border);
+    unchanged_ = false;
+  }
+  rows_ = fitted(std::move(pixels), view);
   if (masked && view.mask_apart) {
     weights_ = fitted(mask_rows(mask_, raw_.width, raw_.height), view);
   }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -33,6 +34,28 @@ enum class AlphaUse {
   kCutout,  ///< background: the photos show a body that was cut out
 };
 
+/// What counts of black borders that all photos of a data set have.
+enum class BorderUse {
+  kAuto,  ///< nothing: no more than what MaskUse::kIgnore ignores
+  kKeep,  ///< all: they are a part of the scene
+};
+
+/// What all photos of a size have along their edges and no scene shows, as the bars of a video: how
+/// many pixels of the photo on disk, from each edge.
+struct PhotoBorder {
+  std::vector<int> top, bottom;  ///< of every column
+  std::vector<int> left, right;  ///< of every row
+
+  /// Whether it takes the pixel.
+  bool hides(int x, int y) const {
+    const auto column = static_cast<std::size_t>(x), row = static_cast<std::size_t>(y);
+    const int width = static_cast<int>(top.size()), height = static_cast<int>(left.size());
+    return y < top[column] || y >= height - bottom[column] || x < left[row] ||
+           x >= width - right[row];
+  }
+  bool operator==(const PhotoBorder&) const = default;
+};
+
 /// One photo and the camera that took it, at the size it is used (after --downscale).
 struct View {
   Camera camera;                     ///< of the picture that load_view_image() gives
@@ -44,7 +67,8 @@ struct View {
   bool mask_cuts = false;   ///< what the mask leaves out is background (MaskUse::kCutout)
   Camera source_camera;     ///< of the photo on disk, with its lens
   int sample_bytes = 1;     ///< of a number in the photo on disk: 1, 2 or 4 (floats)
-  bool test = false;        ///< held out
+  std::shared_ptr<const PhotoBorder> border;  ///< which does not count; null: there is none
+  bool test = false;                          ///< held out
 };
 
 /// Sparse points of a COLMAP model or a PLY named by the data set.
@@ -82,6 +106,8 @@ struct DatasetOptions {
   bool undistort = true;
   MaskUse masks = MaskUse::kIgnore;  ///< what black in masks means
   AlphaUse alpha = AlphaUse::kAuto;  ///< what transparent in photos means
+  /// What a black border means that all photos have. None is looked for where photos are cut out.
+  BorderUse borders = BorderUse::kAuto;
   /// What is taken off all positions; none = 0, but a point near the cameras where the scene lies
   /// so far from the origin of its files (surveyed captures) that single precision would blur it.
   std::optional<std::array<double, 3>> origin;

@@ -4,6 +4,7 @@
 import copy
 import json
 import pickle
+import shutil
 
 import numpy as np
 import pytest
@@ -143,6 +144,20 @@ def test_photos_of_other_lenses(folder):
     assert view.source_camera.model == "photo-lens"
     for each in assert_copies(view):
         assert np.array_equal(each.picture(), view.picture())
+
+
+def test_photos_with_bars(folder, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    shutil.copytree(folder, tmp_path / "video")
+    random = np.random.default_rng(1)
+    for view in rs.Dataset.load(tmp_path / "video").views:
+        photo = random.integers(60, 256, (view.camera.height, view.camera.width, 3), np.uint8)
+        photo[:4] = 0
+        image.fromarray(photo).save(view.image_path)
+    view = rs.Dataset.load(tmp_path / "video").views[0]
+    for each in assert_copies(view):
+        assert not each.picture()[:4, :, 3].any() and each.picture()[6:, :, 3].all()
+    assert rs.Dataset.load(tmp_path / "video", borders="keep").views[0].picture()[..., 3].all()
 
 
 def test_states_of_other_versions_are_refused():

@@ -9,6 +9,7 @@
 
 #include <array>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <tuple>
@@ -19,6 +20,7 @@
 #include "images.hpp"
 #include "names.hpp"
 #include "raysplats/dataset.hpp"
+#include "raysplats/error.hpp"
 
 namespace raysplats::python {
 namespace {
@@ -29,6 +31,7 @@ Dataset load(const std::filesystem::path& path,
              bool undistort,
              const std::string& masks,
              const std::string& alpha,
+             const std::string& borders,
              const std::optional<std::array<double, 3>>& origin) {
   DatasetOptions options;
   options.downscale = downscale;
@@ -36,6 +39,7 @@ Dataset load(const std::filesystem::path& path,
   options.undistort = undistort;
   options.masks = value_of(kMaskUses, "masks", masks);
   options.alpha = value_of(kAlphaUses, "alpha", alpha);
+  options.borders = value_of(kBorderUses, "borders", borders);
   options.origin = origin;
   return load_dataset(path, options);
 }
@@ -55,7 +59,8 @@ std::optional<std::filesystem::path> path_or_none(const std::filesystem::path& p
 }
 
 using Paths = std::array<std::optional<std::filesystem::path>, 3>;
-using ViewState = std::tuple<Camera, Camera, Paths, IndexArray, bool, bool, int, bool>;
+using Border = std::optional<std::array<std::vector<int>, 4>>;
+using ViewState = std::tuple<Camera, Camera, Paths, IndexArray, bool, bool, int, Border, bool>;
 using DatasetState = std::tuple<std::string,
                                 std::filesystem::path,
                                 std::vector<View>,
@@ -67,9 +72,27 @@ using DatasetState = std::tuple<std::string,
                                 std::array<double, 3>,
                                 int>;
 
+Border border_state(const View& view) {
+  if (!view.border) return std::nullopt;
+  const PhotoBorder& border = *view.border;
+  return std::array{border.top, border.bottom, border.left, border.right};
+}
+
+std::shared_ptr<const PhotoBorder> border_of(const Border& state, const Camera& photo) {
+  if (!state) return nullptr;
+  const auto& [top, bottom, left, right] = *state;
+  const auto width = static_cast<std::size_t>(photo.width);
+  const auto height = static_cast<std::size_t>(photo.height);
+  if (top.size() != width || bottom.size() != width || left.size() != height ||
+      right.size() != height) {
+    throw UsageError("The border of this view is of another photo's size: copy views whole");
+  }
+  return std::make_shared<const PhotoBorder>(PhotoBorder{top, bottom, left, right});
+}
+
 View view_of(const ViewState& state) {
-  const auto& [camera, source_camera, paths, points, mask_apart, mask_cuts, sample_bytes, test] =
-      state;
+  const auto& [camera, source_camera, paths, points, mask_apart, mask_cuts, sample_bytes, border,
+               test] = state;
   View out;
   out.camera = camera;
   out.source_camera = source_camera;
@@ -80,6 +103,7 @@ View view_of(const ViewState& state) {
   out.mask_apart = mask_apart;
   out.mask_cuts = mask_cuts;
   out.sample_bytes = sample_bytes;
+  out.border = border_of(border, source_camera);
   out.test = test;
   return out;
 }
@@ -121,7 +145,7 @@ void bind_view(nb::module_& module) {
                                Paths{path_or_none(v.image_path), path_or_none(v.mask_path),
                                      path_or_none(v.depth_path)},
                                view(self, v.points.data(), {v.points.size()}), v.mask_apart,
-                               v.mask_cuts, v.sample_bytes, v.test);
+                               v.mask_cuts, v.sample_bytes, border_state(v), v.test);
            })
       .def(
           "__setstate__",
@@ -140,7 +164,7 @@ void bind_datasets(nb::module_& module) {
       .def_static(
           "load", &load, nb::arg("path"), nb::kw_only(), nb::arg("downscale") = 1.0,
           nb::arg("test_every") = 8, nb::arg("undistort") = true, nb::arg("masks") = "ignore",
-          nb::arg("alpha") = "auto", nb::arg("origin") = nb::none(),
+          nb::arg("alpha") = "auto", nb::arg("borders") = "auto", nb::arg("origin") = nb::none(),
           nb::call_guard<nb::gil_scoped_release>(),
           "Reads a COLMAP, nerfstudio, Blender, LLFF or Polycam folder, everything but the pixels.")
       .def_prop_ro(

@@ -63,6 +63,8 @@ inline constexpr std::array<Name<MaskUse>, 2> kMaskUses{
     {{"ignore", MaskUse::kIgnore}, {"cutout", MaskUse::kCutout}}};
 inline constexpr std::array<Name<AlphaUse>, 3> kAlphaUses{
     {{"auto", AlphaUse::kAuto}, {"ignore", AlphaUse::kIgnore}, {"cutout", AlphaUse::kCutout}}};
+inline constexpr std::array<Name<BorderUse>, 2> kBorderUses{
+    {{"auto", BorderUse::kAuto}, {"keep", BorderUse::kKeep}}};
 inline constexpr std::array<Name<SpzAxes>, 2> kSpzAxes{
     {{"ply", SpzAxes::kPly}, {"rub", SpzAxes::kRub}}};
 inline constexpr std::array<Name<DatasetKind>, 5> kDatasetKinds{

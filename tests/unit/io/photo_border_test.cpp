@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/photo_border.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "raysplats/dataset.hpp"
+#include "raysplats/io.hpp"
+#include "unit/io/data_sets.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+constexpr int kPhotos = 12;
+constexpr int kWidth = 64, kHeight = 48;
+
+// Whether a photo is black there.
+using Black = std::function<bool(int photo, int x, int y)>;
+
+// Brightness of what a camera sees that goes on from photo to photo.
+float scenery(int photo, int x, int y) {
+  return 0.5f + 0.3f * std::sin(0.4f * static_cast<float>(x + 3 * photo)) *
+                    std::cos(0.5f * static_cast<float>(y + photo));
+}
+
+// Compression leaves this on black.
+float speck(int photo, int x, int y) {
+  return static_cast<float>((31 * photo + 17 * x + 7 * y) % 20) / 255.0f;
+}
+
+struct Photos {
+  int count = kPhotos;
+  std::string camera = "\"camera_angle_x\": 0.8";
+  int channels = 3;
+};
+
+void write_photos(const Scratch& scratch, const Black& black, const Photos& photos = {}) {
+  std::string frames;
+  for (int photo = 0; photo < photos.count; ++photo) {
+    Image image(kWidth, kHeight, photos.channels, 1.0f);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const float value = black(photo, x, y) ? speck(photo, x, y) : scenery(photo, x, y);
+        for (int c = 0; c < 3; ++c) image.at(x, y, c) = value;
+      }
+    }
+    const std::string name = "photo_" + std::to_string(10 + photo) + ".png";
+    write_image(scratch / name, image);
+    frames += std::string(photo > 0 ? ", " : "") + "{\"file_path\": \"" + name +
+              "\", \"transform_matrix\": " + matrix_json(photo) + "}";
+  }
+  write_bytes(scratch / "transforms.json", "{" + photos.camera + ", \"frames\": [" + frames + "]}");
+}
+
+bool bars(int /*photo*/, int /*x*/, int y) { return y < 6 || y >= kHeight - 8; }
+
+bool has_borders(const Scratch& scratch, BorderUse use = BorderUse::kAuto) {
+  DatasetOptions options;
+  options.borders = use;
+  const Dataset dataset = load_dataset(scratch.path(), options);
+  const auto bordered = std::count_if(dataset.views.begin(), dataset.views.end(),
+                                      [](const View& view) { return view.border != nullptr; });
+  CHECK((bordered == 0 || bordered == static_cast<long>(dataset.views.size())));
+  return bordered > 0;
+}
+
+// The share of the pixels that a border hides though they show something, and of those that it
+// leaves though they do not.
+struct Wrong {
+  double hidden = 0;
+  double left = 0;
+};
+
+Wrong wrong(const Scratch& scratch, const Black& black) {
+  const Dataset dataset = load_dataset(scratch.path());
+  REQUIRE(dataset.views.front().border);
+  Wrong out;
+  const Image picture = load_view_image(dataset.views.front());
+  REQUIRE(picture.width == kWidth);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const bool counts = picture.at(x, y, 3) > 0;
+      if (!black(0, x, y) && !counts) out.hidden += 1.0 / (kWidth * kHeight);
+      if (black(0, x, y) && counts) out.left += 1.0 / (kWidth * kHeight);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("the bars of a video do not count, in held-out photos neither, unless they are kept") {
+  const Scratch scratch;
+  write_photos(scratch, bars);
+  const Dataset dataset = load_dataset(scratch.path());
+  for (const View& view : dataset.views) {
+    REQUIRE(view.border);
+    // A pixel more, where pictures of bars are blurred.
+    CHECK(view.border->top == std::vector<int>(kWidth, 7));
+    CHECK(view.border->bottom == std::vector<int>(kWidth, 9));
+    CHECK(view.border->left == std::vector<int>(kHeight, 0));
+    CHECK(view.border->right == std::vector<int>(kHeight, 0));
+    const Image picture = load_view_image(view);
+    for (const int y : {0, 6, 39, 47}) CHECK(picture.at(30, y, 3) == 0.0f);
+    for (const int y : {7, 20, 38}) CHECK(picture.at(30, y, 3) == 1.0f);
+  }
+  CHECK(io::hidden_share(*dataset.views.front().border) == doctest::Approx(16.0 / kHeight));
+  CHECK_FALSE(has_borders(scratch, BorderUse::kKeep));
+}
+
+TEST_CASE("pixels of reduced photos count as far as no border takes them") {
+  const Scratch scratch;
+  write_photos(scratch, bars);
+  DatasetOptions options;
+  options.downscale = 4;
+  const Image picture = load_view_image(load_dataset(scratch.path(), options).views.front());
+  REQUIRE(picture.height == kHeight / 4);
+  CHECK(picture.at(5, 0, 3) == 0.0f);
+  CHECK(picture.at(5, 1, 3) == doctest::Approx(0.25));
+  CHECK(picture.at(5, 1, 0) > 0.15f);  // of the row that counts alone
+  CHECK(picture.at(5, 2, 3) == 1.0f);
+}
+
+TEST_CASE("borders may lie on all sides, bend, or surround the circle of a fisheye") {
+  const auto window = [](int, int x, int y) {
+    return x < 5 || x >= kWidth - 9 || y < 4 || y >= kHeight - 4;
+  };
+  const auto pillars = [](int, int x, int) { return x < 16 || x >= kWidth - 16; };
+  // As photos are whose lens was taken out by another program.
+  const auto bent = [](int, int x, int y) {
+    const double u = (x + 0.5) / (kWidth / 2) - 1, v = (y + 0.5) / (kHeight / 2) - 1;
+    const double stretch = 1 + 0.15 * (u * u + v * v);
+    return std::abs(u * stretch) > 1.02 || std::abs(v * stretch) > 1.02;
+  };
+  for (const Black& black : {Black(window), Black(pillars), Black(bent)}) {
+    const Scratch scratch;
+    write_photos(scratch, black);
+    const Wrong found = wrong(scratch, black);
+    CHECK(found.left < 0.01);
+    CHECK(found.hidden < 0.08);
+  }
+  const auto circle = [](int, int x, int y) {
+    return std::hypot(x + 0.5 - kWidth / 2, y + 0.5 - kHeight / 2) > kHeight / 2;
+  };
+  const Scratch scratch;
+  write_photos(scratch, circle,
+               {.camera = "\"camera_model\": \"OPENCV_FISHEYE\", \"fl_x\": 16, \"fl_y\": 16"});
+  const Wrong found = wrong(scratch, circle);
+  CHECK(found.left < 0.02);
+  CHECK(found.hidden < 0.08);
+}
+
+TEST_CASE("a black frame between others, and one with a speck in its bars, hide no border") {
+  const Scratch scratch;
+  write_photos(scratch, [](int photo, int x, int y) {
+    if (photo == 1 || photo == 5) return true;  // photo 0 is held out
+    return bars(photo, x, y) && !(photo == 4 && x == 20 && y == 2);
+  });
+  CHECK(has_borders(scratch));
+}
+
+TEST_CASE("what is black without being a border counts") {
+  const auto moving_body = [](int photo, int x, int y) {
+    return !(x >= 8 + 2 * photo && x < 28 + 2 * photo && y >= 6 && y < 40);
+  };
+  const auto standing_body = [](int, int x, int y) {
+    return !(x >= 20 && x < 44 && y >= 8 && y < 42);
+  };
+  // Round, and as wide as the photo's half.
+  const auto standing_ball = [](int, int x, int y) { return std::hypot(x - 32, y - 24) > 20; };
+  const auto night_sky = [](int photo, int, int y) { return y < 8 + 5 * (photo % 5); };
+  const auto hill_at_night = [](int, int x, int y) { return y < 4 + x / 2; };
+  const auto one_row = [](int, int, int y) { return y < 1; };
+  const auto nothing = [](int, int, int) { return false; };
+  const auto everything = [](int, int, int) { return true; };
+  for (const Black& black :
+       {Black(moving_body), Black(standing_body), Black(standing_ball), Black(night_sky),
+        Black(hill_at_night), Black(one_row), Black(nothing), Black(everything)}) {
+    const Scratch scratch;
+    write_photos(scratch, black);
+    CHECK_FALSE(has_borders(scratch));
+  }
+}
+
+TEST_CASE("two photos tell of no border, and cut-out ones have none") {
+  const Scratch two;
+  write_photos(two, bars, {.count = 2});
+  CHECK_FALSE(has_borders(two));
+  const Scratch cut;
+  write_photos(cut, bars, {.channels = 4});
+  DatasetOptions options;
+  options.alpha = AlphaUse::kCutout;
+  CHECK_FALSE(load_dataset(cut.path(), options).views.front().border);
+}
+
+TEST_CASE("each size of photos has a border of its own") {
+  const Scratch scratch;
+  write_photos(scratch, bars);
+  for (int photo = 0; photo < kPhotos; photo += 2) {
+    const std::string name = "photo_" + std::to_string(10 + photo) + ".png";
+    Image image(2 * kWidth, 2 * kHeight, 3);
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        for (int c = 0; c < 3; ++c) image.at(x, y, c) = scenery(photo, x, y);
+      }
+    }
+    write_image(scratch / name, image);
+  }
+  const Dataset dataset = load_dataset(scratch.path());
+  for (const View& view : dataset.views)
+    CHECK((view.border != nullptr) == (view.source_camera.width == kWidth));
+}
