@@ -54,7 +54,15 @@ bv difference_of_products(bv a, bv b, bv c, bv d) {
 
 typedef struct {
   BlockLanes t, u, v;
+  uint own;  // not through an edge or a corner that belongs to a neighbour
 } TriangleMeeting;
+
+// Whether a triangle whose a, b, c are positive has its edge from p to q, which the ray meets, and
+// not the neighbour there, which runs through it the other way: that which the ray would cross
+// moved by (e, e^2) for a tiny e. Boxes hold their lower sides, where rays run along them.
+RS_INLINE bi owns_edge(bv px, bv py, bv qx, bv qy) {
+  return RS_BLOCK_MASK(qy > py) | (RS_BLOCK_MASK(qy == py) & RS_BLOCK_MASK(qx < px));
+}
 
 // Triangles whose plane the ray crosses inside, in (t_min, t_max], one bit each, of the
 // RS_BLOCK_LANES from `lane` on.
@@ -83,6 +91,9 @@ RS_INLINE uint ray_meets_triangles(const ShearedRay* ray,
   if (!rs_block_any(inside)) return 0;
   const bv sum = a + b + c;
   const bv reciprocal = 1.0f / sum;
+  meeting->own = rs_block_bits(~((RS_BLOCK_MASK(a == 0.0f) & (front ^ owns_edge(bx, by, cx, cy))) |
+                                 (RS_BLOCK_MASK(b == 0.0f) & (front ^ owns_edge(cx, cy, ax, ay))) |
+                                 (RS_BLOCK_MASK(c == 0.0f) & (front ^ owns_edge(ax, ay, bx, by)))));
   meeting->t.v = (a * az + b * bz + c * cz) * ray->sz * reciprocal;
   meeting->u.v = b * reciprocal;
   meeting->v.v = c * reciprocal;

@@ -69,7 +69,8 @@ RS_SURFACE_KERNEL __kernel void nearest_surface(RS_SURFACE_RAY_ARGUMENTS,
 }
 
 // passes[i] = product of 1 - shadow over the triangles that ray i crosses; rays with t_max < t_min
-// give 1. shadow: one value per triangle.
+// give 1. shadow: one value per triangle. A surface is crossed once where its triangles share an
+// edge or a corner; but nothing passes there between opaque ones that only nearly do.
 RS_SURFACE_KERNEL __kernel void light_through(RS_SURFACE_RAY_ARGUMENTS,
                                               __global const float* restrict shadow,
                                               __global float* restrict passes) {
@@ -95,8 +96,11 @@ RS_SURFACE_KERNEL __kernel void light_through(RS_SURFACE_RAY_ARGUMENTS,
         for (uint from = 0; from < LANES; from += RS_BLOCK_LANES) {
           uint met = ray_meets_triangles(&sheared, block, from, ray.t_min, raw.t_max, &meeting);
           for (; met != 0; met &= met - 1) {
-            const int triangle = triangle_index(block, from + rs_lowest_bit(met));
-            if (triangle != skipped) light *= 1.0f - shadow[triangle];
+            const uint lane = rs_lowest_bit(met);
+            const int triangle = triangle_index(block, from + lane);
+            if (triangle == skipped) continue;
+            const bool counts = (meeting.own >> lane & 1) != 0 || shadow[triangle] >= 1.0f;
+            light *= counts ? 1.0f - shadow[triangle] : 1.0f;
           }
         }
       }

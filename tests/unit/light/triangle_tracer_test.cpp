@@ -251,7 +251,7 @@ TEST_CASE("no ray leaves a closed mesh, through its edges and corners neither") 
 
 TEST_CASE("rays that graze a closed mesh cross it an even number of times") {
   // Seen from outside every line through a corner or edge enters as often as it leaves; a light
-  // factor of one half per triangle counts the crossings, twice where it meets an edge.
+  // factor of one half per triangle counts the crossings.
   Context context = make_test_context();
   const Mesh mesh = reference::ball({0.1, 0.2, 0.3}, 0.9, 8, 0, false);
   TriangleTracer tracer(context);
@@ -277,6 +277,45 @@ TEST_CASE("rays that graze a closed mesh cross it an even number of times") {
   }
   CHECK(odd == 0);
   CHECK(crossed > 5000);
+}
+
+TEST_CASE("light crosses a surface once where its triangles share an edge or a corner [small]") {
+  // Eighths: all of the arithmetic is exact, and rays meet edges and corners as they are.
+  Context context = make_test_context();
+  Mesh fan;  // around the origin; every second triangle in the other sense
+  fan.positions = {0, 0,  0, 1, 0,  0,  1, 1, 0,  0, 1, 0,  -1, 1,
+                   0, -1, 0, 0, -1, -1, 0, 0, -1, 0, 1, -1, 0};
+  for (std::uint32_t k = 1; k <= 8; ++k) {
+    const std::uint32_t next = k % 8 + 1;
+    fan.triangles.insert(fan.triangles.end(), {0, k % 2 == 0 ? k : next, k % 2 == 0 ? next : k});
+    fan.materials.push_back(0);
+  }
+  std::vector<Ray> rays;
+  for (const glm::dvec3 along : {glm::dvec3(0, 0, 1), glm::dvec3(0.5, 0, 1), glm::dvec3(0, -2, 1),
+                                 glm::dvec3(0.25, 0.5, -1), glm::dvec3(1, 1, 0.5)}) {
+    for (int x = -7; x < 8; ++x) {
+      for (int y = -7; y < 8; ++y)
+        rays.push_back(make_ray(glm::dvec3(x / 8.0, y / 8.0, 0) - 4.0 * along, along));
+    }
+  }
+  for (const int lanes : {4, 8, 16}) {
+    CAPTURE(lanes);
+    TriangleTracer tracer(context, lanes);
+    tracer.build(std::vector<Mesh>{fan});
+    Buffer<Ray> device_rays(context, rays.size(), "rays");
+    device_rays.upload(rays);
+    Buffer<std::int32_t> skip(context, rays.size(), "skip");
+    skip.fill(~0u);
+    Buffer<float> shadow(context, tracer.size(), "shadow");
+    Buffer<float> passes(context, rays.size(), "passes");
+    for (const float strength : {0.25f, 1.0f}) {
+      shadow.upload(std::vector<float>(tracer.size(), strength));
+      tracer.light_through(device_rays, skip, shadow, rays.size(), passes);
+      const std::vector<float> light = passes.download();
+      CHECK(std::count(light.begin(), light.end(), 1.0f - strength) ==
+            static_cast<std::ptrdiff_t>(rays.size()));
+    }
+  }
 }
 
 TEST_CASE("light that passes is the product over the crossed triangles [small]") {
