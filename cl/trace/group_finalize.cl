@@ -103,7 +103,7 @@ void park(__local float* row, const ViewGaussian* g, const float* mean) {
   }
   for (int j = 0; j < 4; ++j) row[9 + j] = g->q[j];
   row[13] = g->q_norm;
-  row[14] = g->opacity;
+  row[14] = g->logit;
   barrier(CLK_LOCAL_MEM_FENCE);
 }
 
@@ -116,7 +116,8 @@ void unpark(const __local float* row, ViewGaussian* g, float* mean) {
   }
   for (int j = 0; j < 4; ++j) g->q[j] = row[9 + j];
   g->q_norm = row[13];
-  g->opacity = row[14];
+  g->logit = row[14];
+  g->opacity = rs_sigmoid(g->logit);
 }
 
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(

@@ -169,6 +169,7 @@ __kernel void finish_ray_gradients(const uint begin,
   gq[3] = g.q[0] * turn[2] + g.q[1] * turn[1] - g.q[2] * turn[0];
   for (int j = 0; j < 4; ++j) gq[j] = touched ? 2.0f * gq[j] / g.q_norm : zero;
   store_columns4(gq, g_quaternions + 4 * i);
-  const fv opacity = rs_sigmoid(load_column(opacities + i, 1));
-  store_column(touched ? v[9] * (1.0f - opacity) : zero, g_opacities + i, 1);
+  // 1 - opacity has no digits left where a Gaussian is nearly opaque.
+  const fv transparency = rs_sigmoid(-load_column(opacities + i, 1));
+  store_column(touched ? v[9] * transparency : zero, g_opacities + i, 1);
 }

@@ -35,6 +35,7 @@ typedef struct {
   fv raw_scale[3];
   fv q[4];  // unit quaternion
   fv q_norm;
+  fv logit;  // of the opacity
   fv opacity;
 } ViewGaussian;
 
@@ -77,7 +78,8 @@ iv load_view_gaussian(const size_t i,
     g->w[k] = 1.0f / g->scale[k];
     sum += g->raw_scale[k];
   }
-  g->opacity = rs_sigmoid(load_column(opacities + i, 1));
+  g->logit = load_column(opacities + i, 1);
+  g->opacity = rs_sigmoid(g->logit);
   return (fabs(sum + g->opacity) <= FLT_MAX) & (g->q_norm > 0.0f);
 }
 

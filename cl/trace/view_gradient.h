@@ -248,7 +248,8 @@ void parameter_gradient(const ViewGaussian* g,
     const fv value = -view->w[k] * g->w[k] * rs_scale_log_derivative(g->scale[k]);
     out->scale[k] = moves ? value : zero;
   }
-  out->opacity = touched ? opacity * g->opacity * (1.0f - g->opacity) : zero;
+  // 1 - opacity has no digits left where a Gaussian is nearly opaque.
+  out->opacity = touched ? opacity * g->opacity * rs_sigmoid(-g->logit) : zero;
 }
 
 // Contribution to the camera's gradient: centre in world axes, left rotation vector in camera axes.

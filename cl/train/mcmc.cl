@@ -30,7 +30,7 @@ __kernel void mcmc_press(uint count,
   const size_t i = get_global_id(0);
   if (i >= count || guard[0] != 0) return;
   const float opacity = rs_sigmoid(opacities[i]);
-  opacity_gradient[i] += opacity_weight * opacity * (1.0f - opacity);
+  opacity_gradient[i] += opacity_weight * opacity * rs_sigmoid(-opacities[i]);
   const float3 scale = vload3(i, scales);
   const float3 derivative = (float3)(mcmc_scale_derivative(scale.x), mcmc_scale_derivative(scale.y),
                                      mcmc_scale_derivative(scale.z));

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <algorithm>
+
 #include "scene/pixel_count.hpp"
 #include "skip_test.hpp"
 #include "trace/gradient_sums.hpp"
@@ -137,6 +139,20 @@ TEST_CASE("gradients of opaque and of vanishing Gaussians") {
       TraceOptions options = packet.over({});
       options.min_transmittance = stop;
       CHECK_ERRORS(compare_gradients(context, model, options, camera), 2e-3);
+    }
+  }
+}
+
+TEST_CASE("the opacities of nearly opaque Gaussians have gradients") {
+  Context context = make_test_context();
+  Gaussians model = reference::random_scene(60, 23, 0);
+  for (const float logit : {12.0f, 16.118f, 20.0f}) {
+    CAPTURE(logit);
+    std::fill(model.opacities.begin(), model.opacities.end(), logit);
+    for (const Packet& packet : packets({1, 16}, {32})) {
+      CAPTURE(packet);
+      CHECK_ERRORS(
+          compare_gradients(context, model, packet.over({}), reference::cube_camera(20, 18)), 1e-3);
     }
   }
 }

@@ -193,6 +193,13 @@ TEST_CASE("gradients of arbitrary rays where Gaussians are opaque, vanish or are
   }
   CHECK_ERRORS(compare_gradients(context, model, {}, random_rays(400, 24), ColorDirection::kRay),
                1e-3);
+  for (const float logit : {12.0f, 16.118f, 20.0f}) {
+    CAPTURE(logit);
+    Gaussians nearly = reference::random_scene(60, 74, 0);
+    std::fill(nearly.opacities.begin(), nearly.opacities.end(), logit);
+    CHECK_ERRORS(compare_gradients(context, nearly, {}, random_rays(400, 24), ColorDirection::kRay),
+                 1e-3);
+  }
   // Discs a thousand times wider than thick.
   Gaussians discs = reference::random_scene(250, 75, 0);
   for (std::size_t i = 0; i < discs.size(); ++i) discs.log_scales[3 * i + i % 3] -= 7.0f;
