@@ -20,6 +20,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/gaussians.hpp"
 #include "raysplats/io.hpp"
+#include "scene/gaussian_check.hpp"
 #include "util/atomic_file.hpp"
 
 namespace raysplats {
@@ -188,6 +189,10 @@ Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite) {
     if (norm == 0) {
       quaternion[0] = 1.0f;
       ++without_rotation;
+    } else if (const double length = std::sqrt(norm);
+               length < kShortestQuaternion || length > kLongestQuaternion) {
+      const std::array<double, 4> unit = io::unit_quaternion(quaternion);
+      for (std::size_t k = 0; k < 4; ++k) quaternion[k] = static_cast<float>(unit[k]);
     }
     model.opacities[row] = limited(columns.opacity, io::logit_of(0), io::logit_of(1));
     if (columns.filter) {

@@ -27,6 +27,23 @@ void check_finite(const char* name, const std::vector<float>& values) {
                               bad - values.begin(), name));
 }
 
+// Kernels normalise rotations in single precision, where squares have to be numbers.
+void check_lengths(const std::vector<float>& quaternions) {
+  for (std::size_t i = 0; i < quaternions.size(); i += 4) {
+    double squares = 0;
+    for (std::size_t k = i; k < i + 4; ++k) {
+      const double part = quaternions[k];
+      squares += part * part;
+    }
+    const double length = std::sqrt(squares);
+    if (length >= kShortestQuaternion && length <= kLongestQuaternion) continue;
+    throw DataError(
+        fmt::format("The quaternion of Gaussian {} has the length {:.3g}, which is no rotation: "
+                    "normalise it, (1, 0, 0, 0) being none",
+                    i / 4, length));
+  }
+}
+
 }  // namespace
 
 void check_sh_degree(int degree) {
@@ -53,6 +70,7 @@ void check_gaussians(const Gaussians& gaussians) {
   check_finite("log_scales", gaussians.log_scales);
   check_finite("opacities", gaussians.opacities);
   check_finite("sh", gaussians.sh);
+  check_lengths(gaussians.quaternions);
 }
 
 }  // namespace raysplats
