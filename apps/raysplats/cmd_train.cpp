@@ -45,22 +45,30 @@ struct Options {
   DeviceFlags device;
 };
 
+/// Keys whose values --time and --quality choose.
+struct ChosenKeys {
+  std::set<std::string> kept;  ///< as they were chosen, in a run that goes on
+  std::set<std::string> anew;  ///< once more, in place of what a run without a checkpoint has named
+};
+
 /// --time and --quality choose for a new run what its configuration then names. A command that
-/// begins a run or goes on with it may have them each time: returns the keys whose values they
-/// chose for a run that goes on.
-std::set<std::string> check_choices(const CLI::App& command, Options& options) {
+/// begins a run or goes on with it may have them each time.
+ChosenKeys check_choices(const CLI::App& command, Options& options) {
   const auto given = [&](const char* name) { return command.get_option(name)->count() > 0; };
-  std::set<std::string> chosen;
+  ChosenKeys chosen;
   const bool asked = !options.time.empty() || !options.quality.empty();
   if (asked && options.resume == "latest" && !list_checkpoints(options.output).empty()) {
     spdlog::info("--time and --quality are not asked again: {} names what they chose",
                  (std::filesystem::path(options.output) / "config.toml").string());
-    chosen = {"iterations"};
-    if (!options.time.empty()) chosen.insert("end-iteration");
-    if (!options.quality.empty()) chosen.insert("downscale");
+    chosen.kept = {"iterations"};
+    if (!options.time.empty()) chosen.kept.insert("end-iteration");
+    if (!options.quality.empty()) chosen.kept.insert("downscale");
     options.time.clear();
     options.quality.clear();
-  } else if (asked && !options.resume.empty() && options.resume != "latest") {
+  } else if (asked && options.resume == "latest") {
+    chosen.anew = {"iterations",          "end-iteration", "max-gaussians",
+                   "resolution-schedule", "photo-points",  "downscale"};
+  } else if (asked && !options.resume.empty()) {
     throw UsageError(
         "--time and --quality are about new runs: a resumed one has its length, which "
         "--iterations changes");
@@ -99,12 +107,15 @@ Dataset load(const CLI::App& command, Options& options, const DeviceInfo& device
 /// iterations.
 std::int64_t announce(Trainer& trainer, const Options& options, bool quiet) {
   constexpr double kMeasureSeconds = 3;
+  constexpr double kLongSeconds = 3600;
   const bool fits = !options.time.empty();
   if (!fits && (quiet || !options.resume.empty())) return trainer.iterations();
   const RunEstimate estimate = fits ? trainer.fit_time(parse_duration("--time", options.time))
                                     : trainer.estimate(kMeasureSeconds);
-  spdlog::info("{} iterations, up to {} Gaussians: about {} of training", estimate.iterations,
-               estimate.gaussians, format_duration(estimate.seconds));
+  const bool long_by_default = !fits && options.quality.empty() && estimate.seconds > kLongSeconds;
+  spdlog::info("{} iterations, up to {} Gaussians: about {} of training{}", estimate.iterations,
+               estimate.gaussians, format_duration(estimate.seconds),
+               long_by_default ? " (--quality medium or --time 30m are shorter)" : "");
   return estimate.iterations;
 }
 
@@ -218,11 +229,12 @@ void train(const CLI::App& command,
 }
 
 void run(CLI::App& command, Options& options, const GlobalOptions& global) {
-  const std::set<std::string> chosen = check_choices(command, options);
+  const ChosenKeys chosen = check_choices(command, options);
   if (!options.time.empty()) parse_duration("--time", options.time);  // before anything is loaded
   if (!options.resume.empty()) {
     apply_resumed_options(command, options.train,
-                          options.resume == "latest" ? options.output : options.resume, chosen);
+                          options.resume == "latest" ? options.output : options.resume, chosen.kept,
+                          chosen.anew);
   } else if (command.get_option("--iterations")->count() > 0 &&
              command.get_option("--end-iteration")->count() == 0) {
     options.train.end_iteration = 0;  // of a run by time, whose configuration --config has named

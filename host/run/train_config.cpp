@@ -200,12 +200,16 @@ std::set<std::string> apply_given_config(CLI::App& app,
   return named;
 }
 
-// What a run wrote of its options; where it could not name them, what they were then.
+// What a run wrote of its options, but for keys in `anew`; where it could not name them, what they
+// were then.
 void apply_run_text(CLI::App& app,
                     TrainOptions& options,
                     const std::string& text,
-                    const std::filesystem::path& path) {
-  const auto given = given_on(app);
+                    const std::filesystem::path& path,
+                    const std::set<std::string>& anew) {
+  const auto given = [&, on_line = given_on(app)](const std::string& key) {
+    return anew.contains(key) || on_line(key);
+  };
   const std::set<std::string> found = read_text(text, path, options, given);
   if (found.count("origin") == 0 && !given("origin")) options.data.origin.emplace();
   if (found.count("raise-clamped") == 0 && !given("raise-clamped")) options.raise_clamped = false;
@@ -218,15 +222,16 @@ void apply_run_text(CLI::App& app,
 }
 
 // What the run goes on with besides what it had: "iterations 48000 (1500), seed 8 (7)". What the
-// photos choose, of which its configuration names the choice, stays as it was chosen.
-std::string changes(TrainOptions before, TrainOptions after) {
+// photos choose, of which its configuration names the choice, stays as it was chosen; what is
+// chosen `anew` it does not have any more.
+std::string changes(TrainOptions before, TrainOptions after, const std::set<std::string>& anew) {
   const std::vector<OptionRow> were = train_option_rows(before), are = train_option_rows(after);
   std::string out;
   for (std::size_t i = 0; i < are.size(); ++i) {
     const std::string was = were[i].text(), is = are[i].text();
     const bool fitted = is == toml_text("auto") || (are[i].name == "color-range" && is == "0") ||
                         (are[i].name == "iterations" && after.iterations == kFittedLength);
-    if (was != is && !fitted)
+    if (was != is && !fitted && !anew.contains(are[i].name))
       out += fmt::format("{}{} {} ({})", out.empty() ? "" : ", ", are[i].name, is, was);
   }
   return out;
@@ -261,20 +266,21 @@ void add_train_options(CLI::App& app, TrainOptions& options) {
 void apply_resumed_options(CLI::App& app,
                            TrainOptions& options,
                            const std::filesystem::path& source,
-                           const std::set<std::string>& chosen) {
+                           const std::set<std::string>& chosen,
+                           const std::set<std::string>& anew) {
   const std::optional<std::filesystem::path> run = run_folder_of(source);
   bool known = true;
   if (run && is_file(*run / kRunConfig)) {
-    apply_run_text(app, options, file_text(*run / kRunConfig), *run / kRunConfig);
+    apply_run_text(app, options, file_text(*run / kRunConfig), *run / kRunConfig, anew);
   } else if (const std::string text = checkpoint_config(source); !text.empty()) {
-    apply_run_text(app, options, text, kCheckpointConfig);
+    apply_run_text(app, options, text, kCheckpointConfig, anew);
   } else {
     known = false;
   }
   const TrainOptions before = options;
   const std::set<std::string> named = apply_given_config(app, options, chosen);
   // What the command line itself says is no surprise.
-  if (const std::string other = changes(before, options); known && !other.empty())
+  if (const std::string other = changes(before, options, anew); known && !other.empty())
     spdlog::warn("the run goes on with other options than it had, by --config: {}", other);
   // The end of a run by time is not that of a run which is given another length.
   const auto given = [&](const char* key) { return named.count(key) > 0 || given_on(app)(key); };

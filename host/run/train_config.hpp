@@ -25,12 +25,14 @@ void add_train_options(CLI::App& app, TrainOptions& options);
 /// config.toml, or without one from the checkpoint; above them the keys of --config, above these
 /// the command line. `source` is a run folder or a checkpoint file. What a run of an older version
 /// could not name keeps the value that it had then. Keys in `chosen` are the run's, whatever
-/// --config says of them: what it chose in their place is not to be chosen anew. Throws UsageError
-/// as parsing does, DataError for a damaged checkpoint.
+/// --config says of them: what it chose in their place is not to be chosen anew. Of keys in `anew`
+/// the run says nothing, because they are. Throws UsageError as parsing does, DataError for a
+/// damaged checkpoint.
 void apply_resumed_options(CLI::App& app,
                            TrainOptions& options,
                            const std::filesystem::path& source,
-                           const std::set<std::string>& chosen = {});
+                           const std::set<std::string>& chosen = {},
+                           const std::set<std::string>& anew = {});
 
 /// Reads a configuration file into `options`.
 void read_train_config(const std::filesystem::path& path, TrainOptions& options);

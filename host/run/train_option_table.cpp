@@ -218,7 +218,8 @@ void add_start_options(TrainTable& t, TrainOptions& o) {
       "photos' colours), the path of a model, or \"auto\" (points when there are any, else "
       "photos)");
   t.number("init-count", o.init_count, 0, 1e9,
-           "Gaussians of a start without points, or beside few; 0 = a share of max-gaussians");
+           "Gaussians of a start without points, or beside few (not of a model); 0 = a share of "
+           "max-gaussians");
   t.flag(
       "photo-points", o.photo_points,
       "put points of the photos beside sparse ones where photos tell of depth (init auto; not in "
@@ -338,10 +339,10 @@ void add_density_options(TrainTable& t, TrainOptions& o) {
           "iterations (or share of the run) between two passes; 0 = whole passes over the photos, "
           "at least 50 iterations (a tenth of a run below 500) and a hundredth of the run");
   t.share("replace-until", o.replace_until, true,
-          "up to here (share of the run, or iteration) passes of the budget strategy go on without "
-          "growth: what they remove is replaced");
+          "up to here (share of the run, or iteration) passes of the budget and mcmc strategies go "
+          "on without growth: what they remove is replaced");
   t.number("densify-grad-threshold", o.densify_grad_threshold, 0, kHuge,
-           "mean screen-space gradient above which a Gaussian is cloned or split");
+           "mean screen-space gradient above which a Gaussian is cloned or split (adc)");
   t.choice<DensifySignal>(
       "densify-signal", o.densify_signal,
       {{"auto", DensifySignal::kAuto},
@@ -352,25 +353,26 @@ void add_density_options(TrainTable& t, TrainOptions& o) {
       "wants a threshold 2 to 4 times higher), or in its place how far the optimiser has just "
       "moved "
       "the mean, over the scene extent (step, the paper's code); auto = absolute with the budget "
-      "strategy");
+      "strategy; mcmc has none");
   t.number("densify-size", o.densify_size, 0, kHuge,
-           "larger ones (times the scene extent) are split, smaller ones cloned");
+           "larger ones (times the scene extent) are split, smaller ones cloned (adc)");
   t.choice<SizeMeasure>(
       "densify-measure", o.densify_measure,
       {{"longest", SizeMeasure::kLongest}, {"norm", SizeMeasure::kNorm}},
-      "what densify-size, prune-scale and prune-scale-min compare: the longest axis or the root of "
-      "the sum of the squares of all three (norm, the paper's code)");
+      "what densify-size, prune-scale and prune-scale-min compare (adc): the longest axis or the "
+      "root of the sum of the squares of all three (norm, the paper's code)");
   t.flag("densify-inherit", o.densify_inherit,
          "new Gaussians keep the optimiser's state of the one they come from, as in the paper's "
          "code; else it begins at zero");
   t.number("split-factor", o.split_factor, 1, 100,
-           "children of a split are smaller by this factor");
+           "children of a split are smaller by this factor (adc)");
   t.number("prune-opacity", o.prune_opacity, 0, 1, "Gaussians below this opacity are removed");
   t.number("prune-scale", o.prune_scale, 0, kHuge,
-           "Gaussians with a larger axis (times the scene extent) are removed; 0 = none");
+           "Gaussians with a larger axis (times the scene extent) are removed (adc); 0 = none");
   t.number(
       "prune-scale-min", o.prune_scale_min, 0, kHuge,
-      "Gaussians whose longest axis is below this (times the scene extent) are removed; 0 = none");
+      "Gaussians whose longest axis is below this (times the scene extent) are removed (adc); 0 = "
+      "none");
   t.number(
       "max-gaussians", o.max_gaussians, 0, 2e9,
       "hard limit of the count; the strongest candidates win; 0 = from the photos' pixels, the "

@@ -67,8 +67,11 @@ T option_number(const std::string& key, const std::string& text, double low, dou
   const double number = std::is_floating_point_v<T> ? parse_real(text).value_or(low)
                                                     : static_cast<double>(value.value_or(T{}));
   if (!value || number < low || number > high) {
-    throw UsageError(fmt::format("The option '{}' needs {}, not '{}'", key,
-                                 number_words(std::is_integral_v<T>, low, high), text));
+    // A bound that goes without saying is said to who is beyond it.
+    const std::string upper =
+        number > high && high >= kNoBound ? fmt::format(" and at most {}", high) : "";
+    throw UsageError(fmt::format("The option '{}' needs {}{}, not '{}'", key,
+                                 number_words(std::is_integral_v<T>, low, high), upper, text));
   }
   return *value;
 }

@@ -33,6 +33,8 @@ class RunWatcher {
   /// Hears of every row of metrics.csv and of every evaluation.
   virtual void noted(const TrainRow& row) = 0;
   virtual void evaluated(const EvaluationRow& row) = 0;
+  /// Hears that the run will end with another iteration than it was planned to.
+  virtual void will_end(std::int64_t iteration) = 0;
   /// Asked after every step, which the device may still be busy with: has to be quick. Nothing is
   /// waited for unless it says yes.
   virtual bool wants_look() = 0;

@@ -154,7 +154,8 @@ struct Trainer::Impl {
   void undo_pilot();
   RunEstimate estimate(double seconds);
   RunEstimate fit_time(double seconds);
-  void fit_end_to_time();
+  bool fit_end_to_time();
+  void tell_fitted_end() const;
 
   // trainer_validation.cpp: training views that judge the run.
   std::int64_t join_iteration() const;

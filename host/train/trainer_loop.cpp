@@ -88,7 +88,10 @@ void Trainer::Impl::run_iterations(std::int64_t until, const Loop& loop) {
 bool Trainer::Impl::run_iteration(const Loop& loop) {
   if (ranks.size() > 1) asked.stop_wished = loop.interrupted() || asked.stop;
   send_sampled_step();
-  fit_end_to_time();
+  if (fit_end_to_time()) {
+    loop.progress.set_total(last_iteration(options));
+    untimed(loop, [this] { tell_fitted_end(); });
+  }
   const bool last = iteration == last_iteration(options);
   if (last || every(options.log_every, iteration)) report(loop.progress);
   if (every(options.validate_every, iteration)) untimed(loop, [this] { validate_model(); });
@@ -107,9 +110,10 @@ bool Trainer::Impl::saves_model(std::int64_t at) const {
 }
 
 // What follows a step: evaluations and files, before density control, as in 3DGS, because fresh
-// clones and children have not settled yet; then that, and the checkpoint. Unless the iteration is
-// `anew`, files that are there stay. Returns whether the run ends with it, as it does with `stop`.
-// What is done together rank 0 decides: others may have a folder of their own, which says less.
+// clones and children have not settled yet; then that, and the checkpoint. An interrupted run
+// leaves evaluations and density control to the one that goes on. Unless the iteration is `anew`,
+// files that are there stay. Returns whether the run ends with it, as it does with `stop`. What is
+// done together rank 0 decides: others may have a folder of their own, which says less.
 bool Trainer::Impl::finish_iteration(const Loop& loop, bool stop, bool anew) {
   const bool last = iteration == last_iteration(options);
   bool ends = false;
@@ -134,7 +138,7 @@ bool Trainer::Impl::finish_iteration(const Loop& loop, bool stop, bool anew) {
     untimed(loop, [this, last, ends] { evaluate_views(last || ends); });
   if (last) {
     pass_due = false;
-  } else {
+  } else if (ends || !stop) {
     control_density();
   }
   const bool save_now = asked.save.exchange(false);
@@ -194,7 +198,7 @@ void Trainer::Impl::run_and_rescue(std::int64_t until,
 
 TrainSummary Trainer::Impl::train(bool show_progress) {
   const Busy busy(*this);
-  const InterruptGuard interrupt;
+  const InterruptGuard interrupt(LostReader::kInterrupts);
   {
     const auto turn = context.lock();
     make_first_model();

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 #include <thread>
 #include <vector>
@@ -27,7 +28,8 @@ constexpr std::int64_t kLeastIterations = 10;
 constexpr double kShortRun = 20;    // seconds of a run that is not worth more measuring
 constexpr double kFillShare = 0.5;  // of the limit that a start takes at most
 constexpr std::int64_t kFewIterations = 500;
-constexpr double kLatestEnd = 2;  // of the iterations that were planned
+constexpr double kLatestEnd = 2;         // of the iterations that were planned
+constexpr double kTellingChange = 0.03;  // of them, that users are told of
 
 class Timer {
  public:
@@ -299,17 +301,18 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
 
 // Keeps a run by time to its time: its last steps are alike, and once a part of them is timed the
 // time that is left tells how many more there can be. What the steps do depends on the schedules
-// alone, so that a run which is given this end from the beginning has the same bytes.
-void Trainer::Impl::fit_end_to_time() {
-  if (!clock.run_seconds) return;
+// alone, so that a run which is given this end from the beginning has the same bytes. Returns
+// whether the run now has another end.
+bool Trainer::Impl::fit_end_to_time() {
+  if (!clock.run_seconds) return false;
   const std::int64_t from = steady_from(options);
   const std::int64_t until = timed_until(options);
   if (iteration == from) {
     finish_steps();
     clock.steady_seconds = clock.training.seconds();
-    return;
+    return false;
   }
-  if (!clock.steady_seconds || iteration != until || iteration >= options.iterations) return;
+  if (!clock.steady_seconds || iteration != until || iteration >= options.iterations) return false;
   finish_steps();
   const double now = clock.training.seconds();
   const double more = (*clock.run_seconds - now) / (now - *clock.steady_seconds) *
@@ -319,7 +322,17 @@ void Trainer::Impl::fit_end_to_time() {
       std::clamp(static_cast<double>(iteration) + more, static_cast<double>(iteration) + 1, latest);
   options.end_iteration = static_cast<std::int64_t>(ranks.broadcast_value(0, end));
   run.write_config(options);
-  spdlog::debug("{} iterations after all, not {}", options.end_iteration, options.iterations);
+  return true;
+}
+
+// To whoever watches, and to the user where it makes a difference.
+void Trainer::Impl::tell_fitted_end() const {
+  if (watcher) watcher->will_end(options.end_iteration);
+  const double change =
+      static_cast<double>(options.end_iteration) / static_cast<double>(options.iterations) - 1;
+  spdlog::log(std::abs(change) > kTellingChange ? spdlog::level::info : spdlog::level::debug,
+              "{} iterations fit the time after all, not {}", options.end_iteration,
+              options.iterations);
 }
 
 }  // namespace raysplats

@@ -55,8 +55,12 @@ void Trainer::Impl::write_state(const std::filesystem::path& path) {
   write_checkpoint(path, checkpoint, sections);
 }
 
+// With what the run says of itself: one that is killed and goes on from here would not know its
+// commands, and how near it came to each photo. That goes first: a run that goes on from an older
+// state says it anew, step by step, and drops later evaluations.
 void Trainer::Impl::save_checkpoint() {
   if (!ranks.leads()) return;
+  write_metrics(false);
   write_state(checkpoint_path(run.path(), iteration));
   saved = iteration;
   remove_old_checkpoints(run.path(), options.keep_checkpoints, iteration);
@@ -84,6 +88,11 @@ std::string Trainer::Impl::rescue() {
       saved = iteration;
     } catch (const std::exception& error) {
       spdlog::warn("the state of iteration {} cannot be saved: {}", iteration, error.what());
+    }
+    try {
+      if (saved == iteration) write_metrics(false);
+    } catch (const std::exception& error) {
+      spdlog::warn("what the run says of itself cannot be written: {}", error.what());
     }
   }
   if (saved < 0) return "nothing was saved yet";

@@ -15,6 +15,7 @@
 #include "train/memory_estimate.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
+#include "train/unused_options.hpp"
 #include "util/file_kind.hpp"
 #include "util/number_text.hpp"
 
@@ -109,6 +110,18 @@ void warn_of_late(const char* option,
     spdlog::warn("{} = {} is beyond the {} of the run: nothing happens then", option, moment.value,
                  counted(last_iteration(options), "iteration"));
   }
+}
+
+// Options that were asked for and change nothing.
+void warn_of_idle_options(const TrainOptions& options) {
+  if (const std::string unused = unused_options(options); !unused.empty())
+    spdlog::warn("these options change nothing of this run: {}", unused);
+  const std::int64_t from = options.densify_from.of(options.iterations);
+  const std::int64_t until = options.densify_until.of(options.iterations);
+  if (until == 0 || from <= until) return;
+  spdlog::warn(
+      "densify-from = {} is later than densify-until = {}: the number of Gaussians never grows",
+      options.densify_from.value, options.densify_until.value);
 }
 
 }  // namespace
@@ -329,6 +342,7 @@ void Trainer::Impl::start() {
   note_unseen(options, train_views.size(), order);
   warn_of_late("eval-at", options.eval_at, options);
   warn_of_late("save-at", options.save_at, options);
+  warn_of_idle_options(options);
   if (options.scale_activation == ScaleActivation::kSigmoid && extent > kSigmoidExtent) {
     spdlog::warn(
         "scale-activation = sigmoid keeps every axis below one unit of the data set, {:.2g} of the "
@@ -336,8 +350,11 @@ void Trainer::Impl::start() {
         "data set in units of which the extent has a few",
         1.0 / extent, extent);
   }
-  if (test_views.empty())
-    spdlog::info("no view is held out, so nothing is measured: --test-every 8 does");
+  if (test_views.empty()) {
+    const bool by_option = options.data.test_every == 0 && dataset.views.size() > 1;
+    spdlog::info("no view is held out, so nothing is measured{}",
+                 by_option ? ": --test-every 8 holds some out" : "");
+  }
   if (const std::size_t by_rays = ray_views(); by_rays > 0) {
     spdlog::info("{} of {} training views are traced ray by ray: {}", by_rays, train_cameras.size(),
                  !options.mirrors.empty() ? "there are mirrors in the scene"

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstring>
 #include <random>
+#include <string>
 
 #include "raysplats/error.hpp"
 
@@ -36,6 +37,17 @@ bool is_temporary_name(const std::string& name) {
   const std::size_t dot = name.rfind('.', mark - 1);
   if (dot == std::string::npos || dot == 0 || dot + 1 == mark) return false;
   return name.find_first_not_of("0123456789", dot + 1) == mark;
+}
+
+// A part of a temporary name. Of whole parts it would be longer than the target's name, which may
+// be as long as the file system takes. Characters of UTF-8 stay whole: bytes within one have the
+// bits 10 first.
+std::string shortened(const std::string& part) {
+  constexpr std::size_t kMost = 64;
+  if (part.size() <= kMost) return part;
+  std::size_t end = kMost;
+  while (end > 0 && (static_cast<unsigned char>(part[end]) & 0xc0) == 0x80) --end;
+  return part.substr(0, end);
 }
 
 // What a link leads to, so that the link stays. A device or pipe would become a plain file, and a
@@ -72,8 +84,8 @@ AtomicFile::AtomicFile(std::filesystem::path target) : target_(real_target(std::
   // By chance: processes on several machines that share the folder may have one number.
   std::random_device chance;
   do {
-    temporary_ = folder / fmt::format(".{}.{}.tmp{}", target_.stem().string(), chance(),
-                                      target_.extension().string());
+    temporary_ = folder / fmt::format(".{}.{}.tmp{}", shortened(target_.stem().string()), chance(),
+                                      shortened(target_.extension().string()));
     descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   } while (descriptor_ < 0 && errno == EEXIST);
   if (descriptor_ < 0) fail("be created");

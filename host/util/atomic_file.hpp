@@ -24,7 +24,8 @@ class AtomicFile {
   AtomicFile(const AtomicFile&) = delete;
   AtomicFile& operator=(const AtomicFile&) = delete;
 
-  /// Path to write to, for libraries that open files themselves; it keeps the target's extension.
+  /// Path to write to, for libraries that open files themselves; it keeps the target's extension,
+  /// or its first 64 bytes.
   const std::filesystem::path& temporary() const { return temporary_; }
   void write(const void* data, std::size_t bytes);
   void write(std::string_view text) { write(text.data(), text.size()); }

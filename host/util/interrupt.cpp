@@ -16,6 +16,7 @@ namespace {
 std::atomic<bool> interrupted{false};
 std::atomic<bool> asked{false};  // by SIGINT or SIGTERM
 std::atomic<int> guards{0};
+std::atomic<int> pipe_guards{0};     // those of LostReader::kInterrupts
 std::atomic<bool> announced{false};  // whether somebody sees what the handler says
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler must not take locks");
 
@@ -27,19 +28,31 @@ bool ignores_hang_ups() {
 // As the program began, by nohup. LLVM in drivers sets a handler of its own afterwards.
 const bool began_ignoring = ignores_hang_ups();
 
+using Handler = void (*)(int);
+
+extern "C" void mark_interrupt(int signal);
+
+// Where another one is set, by whoever uses the library, that stays.
+void replace_pipe_handler(Handler from, Handler to) {
+  struct sigaction present {};
+  if (sigaction(SIGPIPE, nullptr, &present) == 0 && present.sa_handler == from)
+    std::signal(SIGPIPE, to);
+}
+
 // What reads our output, such as tee, may have been ended by the same signal. Without a reader
 // writing then fails; the default action would end the process before anything is saved.
 void outlive_readers() {
-  struct sigaction present {};
-  if (sigaction(SIGPIPE, nullptr, &present) == 0 && present.sa_handler == SIG_DFL)
-    std::signal(SIGPIPE, SIG_IGN);
+  replace_pipe_handler(SIG_DFL, SIG_IGN);
+  replace_pipe_handler(mark_interrupt, SIG_IGN);
 }
 
 // The second of SIGINT and SIGTERM ends the process at once, whichever of the two it is: delivered
-// again when the handler returns, it meets the default action. SIGHUP does not count: where a
-// terminal goes it comes from the system and from the shell, and SIGTERM may come beside it.
+// again when the handler returns, it meets the default action. SIGHUP and SIGPIPE do not count:
+// where a terminal goes the first one comes from the system and from the shell, and SIGTERM may
+// come beside it; the second one tells that a reader has gone, not that somebody is in a hurry.
 extern "C" void mark_interrupt(int signal) {
-  if (signal != SIGHUP && asked.exchange(true)) {
+  const bool from_user = signal != SIGHUP && signal != SIGPIPE;
+  if (from_user && asked.exchange(true)) {
     std::signal(signal, SIG_DFL);
     std::raise(signal);
     return;
@@ -50,16 +63,18 @@ extern "C" void mark_interrupt(int signal) {
   constexpr std::string_view kText =
       "\nInterrupted: stopping as soon as what is done can be kept; once more stops at once\n";
   // There is nothing to do where it fails.
-  if (announced && signal != SIGHUP && ::write(STDERR_FILENO, kText.data(), kText.size()) < 0)
+  if (announced && from_user && ::write(STDERR_FILENO, kText.data(), kText.size()) < 0)
     errno = error;
   errno = error;
 }
 
 }  // namespace
 
-InterruptGuard::InterruptGuard() : outer_(guards++ == 0) {
+InterruptGuard::InterruptGuard(LostReader reader)
+    : outer_(guards++ == 0), hears_pipe_(reader == LostReader::kInterrupts) {
+  if (outer_) interrupted = asked = false;
+  if (hears_pipe_ && pipe_guards++ == 0) replace_pipe_handler(SIG_DFL, mark_interrupt);
   if (!outer_) return;
-  interrupted = asked = false;
   announced = ::isatty(STDERR_FILENO) == 1;
   struct sigaction action {};
   action.sa_handler = mark_interrupt;
@@ -73,6 +88,7 @@ InterruptGuard::InterruptGuard() : outer_(guards++ == 0) {
 
 InterruptGuard::~InterruptGuard() {
   --guards;
+  if (hears_pipe_ && --pipe_guards == 0) replace_pipe_handler(mark_interrupt, SIG_DFL);
   if (!outer_) return;
   sigaction(SIGINT, &previous_int_, nullptr);
   sigaction(SIGTERM, &previous_term_, nullptr);

@@ -5,6 +5,12 @@
 
 namespace raysplats {
 
+/// What SIGPIPE does while an InterruptGuard lives.
+enum class LostReader {
+  kUsual,      ///< as without one: as a rule it ends the process
+  kInterrupts  ///< it is a signal like SIGHUP, unless it was ignored or handled before
+};
+
 /// While one lives, SIGINT, SIGTERM and SIGHUP only set a mark that long work polls, and the first
 /// two say so at once on a terminal; a second one of these two ends the process as usual. SIGHUP
 /// stays ignored where it was (nohup). From the first signal on SIGPIPE is ignored for good, so
@@ -12,7 +18,7 @@ namespace raysplats {
 /// another lives, in this thread or others, shares its mark and must not outlive it.
 class InterruptGuard {
  public:
-  InterruptGuard();
+  explicit InterruptGuard(LostReader reader = LostReader::kUsual);
   ~InterruptGuard();
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
@@ -21,7 +27,8 @@ class InterruptGuard {
   bool requested() const;
 
  private:
-  bool outer_ = false;  // the first of those that live
+  bool outer_ = false;       // the first of those that live
+  bool hears_pipe_ = false;  // kInterrupts
   struct sigaction previous_int_ {};
   struct sigaction previous_term_ {};
   struct sigaction previous_hup_ {};

@@ -93,12 +93,14 @@ std::string Progress::line(int width) const {
   const double share =
       total_ > 0 ? std::clamp(static_cast<double>(done_) / static_cast<double>(total_), 0.0, 1.0)
                  : 1.0;
+  // A narrow terminal cuts off the end.
   std::string text = known ? fmt::format("{}/{}", done_, total_) : std::to_string(done_);
-  if (!fields_.empty()) text += ", " + fields_;
-  if (rate_ > 0 && known) {
-    if (rate_ < kCountable) text += fmt::format(", {:.{}f} it/s", rate_, rate_ < 10 ? 2 : 1);
+  const bool steady = rate_ > 0 && known;
+  if (steady)
     text += fmt::format(", {} left", format_duration(static_cast<double>(total_ - done_) / rate_));
-  }
+  if (!fields_.empty()) text += ", " + fields_;
+  if (steady && rate_ < kCountable)
+    text += fmt::format(", {:.{}f} it/s", rate_, rate_ < 10 ? 2 : 1);
   const int room = std::clamp(width - static_cast<int>(label_.size() + text.size()) - 5, 0, 30);
   if (room < 5)
     return fmt::format("{} {}", label_, text)

@@ -28,6 +28,8 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
+  /// Another number of steps in all, from the next update() on.
+  void set_total(std::int64_t total) { total_ = total; }
   /// Reports that `done` steps are behind us; `fields` is what follows the bar ("loss 0.12,
   /// PSNR 21.3").
   void update(std::int64_t done, const std::string& fields);

@@ -40,6 +40,11 @@ void RunHistory::add(const EvaluationRow& row) {
   tests_.push_back(row);
 }
 
+void RunHistory::set_iterations(std::int64_t iterations) {
+  const Guard guard(mutex_);
+  iterations_ = iterations;
+}
+
 void RunHistory::set_state(bool paused, double share) {
   const Guard guard(mutex_);
   paused_ = paused;

@@ -19,6 +19,7 @@ class RunHistory {
 
   void add(const TrainRow& row);
   void add(const EvaluationRow& row);
+  void set_iterations(std::int64_t iterations);
   void set_state(bool paused, double share);
   /// The last word on the run; empty while it goes on.
   void finish(const std::string& text);

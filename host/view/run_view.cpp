@@ -41,6 +41,7 @@ void RunView::finish(const std::string& text) {
 
 void RunView::noted(const TrainRow& row) { history_.add(row); }
 void RunView::evaluated(const EvaluationRow& row) { history_.add(row); }
+void RunView::will_end(std::int64_t iteration) { history_.set_iterations(iteration); }
 
 void RunView::obey(const RunCommand& command) {
   using Kind = RunCommand::Kind;

@@ -38,6 +38,7 @@ class RunView : public RunWatcher {
 
   void noted(const TrainRow& row) override;
   void evaluated(const EvaluationRow& row) override;
+  void will_end(std::int64_t iteration) override;
   bool wants_look() override;
   RunWish look(const RunMoment& moment, const std::function<bool()>& stopping) override;
 

@@ -2,6 +2,7 @@
 // Runs whose length is not given in iterations.
 #include <doctest/doctest.h>
 
+#include <filesystem>
 #include <fstream>
 #include <string>
 
@@ -70,6 +71,38 @@ TEST_CASE("a command with a quality or a time begins a run, and goes on with it"
   // A run that is named is there already.
   words[5] = run;
   CHECK(raysplats_program(words).code == 2);
+}
+
+TEST_CASE("a time or a quality counts anew where the first try left no checkpoint") {
+  const TemporaryFolder folder;
+  const std::string data = folder / "data", run = folder / "run";
+  succeed({"generate", data, "--size", "16", "--train-views", "3", "--test-views", "1", "-q"});
+  const auto left_of = [&](const Words& more) {
+    std::filesystem::remove_all(run);
+    succeed(Words{"train", data, "-o", run, "-n", "5", "--max-gaussians", "40", "--sh-degree", "1",
+                  "-q"} +
+            more);
+    std::filesystem::remove_all(run + "/checkpoints");
+    std::filesystem::remove_all(run + "/point_cloud");
+  };
+  const auto again = [&](const Words& how) {
+    const Outcome outcome = succeed(Words{"train", data, "-o", run, "--resume", "latest"} + how);
+    CHECK(!contains(outcome.err, "other options than it had"));
+    CHECK(value_of(run, "sh-degree") == "1");  // which nobody chooses
+  };
+  left_of({"--downscale", "2"});
+  again({"--quality", "preview"});
+  CHECK(value_of(run, "iterations") == "300");
+  CHECK(value_of(run, "downscale") == "1");
+  left_of({"--end-iteration", "5"});
+  again({"--time", "3s"});
+  CHECK(value_of(run, "iterations") != "5");
+  CHECK(value_of(run, "end-iteration") != "5");
+  CHECK(value_of(run, "max-gaussians") != "40");
+  // What the command line says is not chosen.
+  left_of({});
+  again({"--quality", "preview", "-n", "7"});
+  CHECK(value_of(run, "iterations") == "7");
 }
 
 TEST_CASE("evaluations beyond the end of a run are not left out in silence") {

@@ -110,6 +110,23 @@ TEST_CASE("a run whose terminal is closed saves all, and one under nohup goes on
     CHECK(program.wait().code == 130);
     CHECK(is_saved(folder / "run"));
   }
+  SUBCASE("that of a program which has read enough, as in train | head") {
+    const std::string pipe = folder / "pipe";
+    REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
+    const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+    REQUIRE(reader >= 0);
+    Surroundings there;
+    there.out_file = there.err_file = pipe;
+    // A line of each evaluation.
+    Words words = tiny_training(folder / "run") +
+                  Words{"-n", "100000000", "--eval-every", "5", "--eval-renders", "0"};
+    std::erase(words, "-q");
+    RunningProgram program(words, there);
+    wait_for_checkpoint(program, folder / "run");
+    REQUIRE(::close(reader) == 0);
+    CHECK(program.wait().code == 130);
+    CHECK(is_saved(folder / "run"));
+  }
   SUBCASE("nohup") {
     Surroundings there;
     there.nohup = true;

@@ -297,6 +297,16 @@ TEST_CASE("a deterministic run with atomic sums is refused as a contradiction") 
   std::filesystem::remove(path);
 }
 
+TEST_CASE("a number beyond a bound that goes without saying is told the bound") {
+  const auto path = temporary("bound.toml");
+  write_text_file(path, "prune-scale-min = 1e300\n");
+  CHECK(message_of(path).find("needs a number of at least 0 and at most 1e+30, not") !=
+        std::string::npos);
+  write_text_file(path, "prune-scale-min = -1\n");
+  CHECK(message_of(path).find("needs a number of at least 0, not '-1'") != std::string::npos);
+  std::filesystem::remove(path);
+}
+
 TEST_CASE("the command line beats the file, wherever --config stands") {
   const auto path = temporary("beats.toml");
   write_text_file(path, "iterations = 77\nseed = 5\nadaptive-radius = false\neval-at = [3, 4]\n");
@@ -321,7 +331,8 @@ namespace {
 // The options of a run that goes on from `source`, by a command line of these words.
 TrainOptions resumed(const std::filesystem::path& source,
                      std::vector<std::string> words = {},
-                     const std::set<std::string>& chosen = {}) {
+                     const std::set<std::string>& chosen = {},
+                     const std::set<std::string>& anew = {}) {
   TrainOptions options;
   CLI::App app;
   std::string from;
@@ -329,7 +340,7 @@ TrainOptions resumed(const std::filesystem::path& source,
   add_train_options(app, options);
   words.insert(words.end(), {"--resume", source.string()});
   app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
-  apply_resumed_options(app, options, source, chosen);
+  apply_resumed_options(app, options, source, chosen, anew);
   return options;
 }
 
@@ -387,6 +398,19 @@ TEST_CASE("a resumed run keeps its options below those of a file and of the comm
               {"iterations", "end-iteration"});
   CHECK(kept_length.iterations == 900);
   CHECK(kept_length.end_iteration == 850);
+
+  // What is to be chosen anew is as in a new run, and nothing that this one goes on with.
+  {
+    const LogCapture log;
+    const TrainOptions anew =
+        resumed(folder / "run", {"--config", (folder / "length.toml").string()}, {},
+                {"iterations", "end-iteration", "photo-points"});
+    CHECK(anew.iterations == 1000);
+    CHECK(anew.end_iteration == 0);
+    CHECK(anew.photo_points);
+    CHECK(anew.seed == 7);
+    CHECK(log.lines() == 0);
+  }
 
   // A checkpoint has them too: in a run without the file, and outside of one beside a file that is
   // not its run's.

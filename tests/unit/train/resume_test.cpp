@@ -103,6 +103,7 @@ TEST_CASE("a run that broke off in an evaluation goes on as if it had not") {
     const std::string message = place.broken(options, name.c_str(), iteration);
     CHECK(contains(message, "iteration " + std::to_string(iteration) + " is saved"));
     CHECK(load_latest_checkpoint(place.run(name.c_str())).pass_due == (iteration == 20));
+    CHECK(place.metrics(name.c_str()).at("iteration") == iteration);
     const auto resumed = place.resumed(options, name.c_str());
     const TrainSummary summary = resumed->run(false);
     check_equal(straight->gaussians().download(), resumed->gaussians().download());
@@ -115,6 +116,59 @@ TEST_CASE("a run that broke off in an evaluation goes on as if it had not") {
       CHECK(summary.evaluations[i].psnr == whole.evaluations[i].psnr);
     }
   }
+}
+
+TEST_CASE("a run that is stopped where it evaluates and density control is due goes on with both") {
+  const Place place;
+  TrainOptions options = growing();
+  options.eval_at = {20};
+  const auto straight = place.trainer(options, "straight");
+  const TrainSummary whole = straight->run(false);
+  const auto first = place.trainer(options, "run");
+  first->on_step([&](const TrainProgress& progress) {
+    if (progress.iteration == 20) first->stop();
+  });
+  CHECK(first->run(false).evaluations.empty());
+  CHECK(load_latest_checkpoint(place.run("run")).pass_due);
+  const auto resumed = place.resumed(options, "run");
+  const TrainSummary summary = resumed->run(false);
+  check_equal(straight->gaussians().download(), resumed->gaussians().download());
+  CHECK(load_latest_checkpoint(place.run("run")).sections ==
+        load_latest_checkpoint(place.run("straight")).sections);
+  REQUIRE(whole.evaluations.size() == 2);
+  REQUIRE(summary.evaluations.size() == 2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    CHECK(summary.evaluations[i].iteration == whole.evaluations[i].iteration);
+    CHECK(summary.evaluations[i].psnr == whole.evaluations[i].psnr);
+  }
+}
+
+TEST_CASE("a run that was killed after a checkpoint knows what it had said of itself until then") {
+  const Place place;
+  TrainOptions options = growing();
+  options.checkpoint_every = 38;
+  place.trainer(options, "straight")->run(false);
+  const auto first = place.trainer(options, "run");
+  first->set_command("train first");
+  first->on_step([&](const TrainProgress& progress) {
+    if (progress.iteration == 39)
+      fs::copy(place.run("run"), place.run("killed"), fs::copy_options::recursive);
+  });
+  first->run(false);
+  // The rest of two steps sees some of the photos alone.
+  const auto second = place.resumed(options, "killed");
+  CHECK(second->iteration() == 38);
+  second->set_command("train second");
+  second->run(false);
+  const nlohmann::json whole = place.metrics("straight"), parts = place.metrics("killed");
+  CHECK(parts.at("command") == "train first");
+  CHECK(parts.at("commands") == nlohmann::json{"train first", "train second"});
+  REQUIRE(parts.at("photos").size() == 5);
+  for (std::size_t i = 0; i < 5; ++i) {
+    CHECK(parts.at("photos")[i].at("name") == whole.at("photos")[i].at("name"));
+    CHECK(parts.at("photos")[i].at("psnr") == whole.at("photos")[i].at("psnr"));
+  }
+  CHECK(parts.at("timed_steps") == whole.at("timed_steps"));
 }
 
 TEST_CASE("steps of one's own after an error begin with the density control that it kept away") {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run says at its start of the photos that it was given.
+// What a run says at its start of the photos and options that it was given.
 #include <doctest/doctest.h>
 
 #include <cstddef>
@@ -77,4 +77,17 @@ TEST_CASE("a run that ends within its first pass says how many photos it never l
   CHECK(capture.says("within 3 iterations the run never looks at 2 of the 8", options));
   options.iterations = 4;
   CHECK_FALSE(capture.says("never looks at", options));
+}
+
+TEST_CASE("a run says which of its options change nothing, and that it never grows") {
+  Capture capture(ring(8, 3.0, {0, 0, 0}));
+  TrainOptions options = short_training(8);
+  CHECK_FALSE(capture.says("change nothing", options));
+  CHECK_FALSE(capture.says("never grows", options));
+  options.split_factor = 2;
+  CHECK(capture.says("change nothing of this run: split-factor (for strategy = adc)", options));
+  options.densify_from = 0.9;
+  CHECK(capture.says("densify-from = 0.9 is later than densify-until = 0.65", options));
+  options.densify_until = 0;  // none is wanted
+  CHECK_FALSE(capture.says("never grows", options));
 }

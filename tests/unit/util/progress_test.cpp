@@ -49,6 +49,20 @@ TEST_CASE("the progress line fits its width and shows the state") {
   CHECK(nothing.line(80).find("0/0") != std::string::npos);
 }
 
+TEST_CASE("a terminal of 80 columns shows the time left beside all that a training says") {
+  Progress progress("Training", 10000, 0, nullptr);
+  progress.update(1234, "loss 0.0213, PSNR 25.31 of this view, 123456 Gaussians");
+  CHECK(progress.line(79).size() <= 79);
+  CHECK(progress.line(79).find(" left") != std::string::npos);
+}
+
+TEST_CASE("work that turns out to be longer has another end in its progress") {
+  Progress progress("Training", 100, 0, nullptr);
+  progress.update(50, "");
+  progress.set_total(200);
+  CHECK(progress.line(120).find("50/200") != std::string::npos);
+}
+
 TEST_CASE("a stream that is no terminal gets plain lines without control characters") {
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::tmpfile(), &std::fclose);
   REQUIRE(file);
@@ -97,4 +111,33 @@ TEST_CASE("a terminal that goes is an interrupt too, however often it says so, b
     CHECK(!guard.requested());
   }
   CHECK((std::signal(SIGHUP, before) == SIG_IGN));
+}
+
+TEST_CASE("a reader that goes is an interrupt where a guard says so, and is ignored from then on") {
+  const auto before = std::signal(SIGPIPE, SIG_DFL);
+  const auto handler = [] {
+    struct sigaction present {};
+    sigaction(SIGPIPE, nullptr, &present);
+    return present.sa_handler;
+  };
+  {
+    const InterruptGuard usual;
+    CHECK((handler() == SIG_DFL));
+    const InterruptGuard inner(LostReader::kInterrupts);  // as ranks have them beside an outer one
+    CHECK((handler() != SIG_DFL));
+  }
+  CHECK((handler() == SIG_DFL));
+  {
+    const InterruptGuard guard(LostReader::kInterrupts);
+    for (int i = 0; i < 3; ++i) std::raise(SIGPIPE);
+    CHECK(guard.requested());
+    std::raise(SIGINT);  // the first one that somebody sends
+  }
+  CHECK((handler() == SIG_IGN));
+  {
+    const InterruptGuard guard(LostReader::kInterrupts);
+    std::raise(SIGPIPE);
+    CHECK(!guard.requested());
+  }
+  std::signal(SIGPIPE, before);
 }

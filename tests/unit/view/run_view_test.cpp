@@ -56,6 +56,11 @@ TEST_CASE("what a page is told of a run does not grow with it, and ends with the
   CHECK(json["rows"] == nlohmann::json{{10, 0.1, 0.5, 11.0, 1000}});
   CHECK(json["left"] == doctest::Approx(999.9));
   CHECK(json["ended"] == "");
+  history.set_iterations(20000);
+  json = nlohmann::json::parse(history.json());
+  CHECK(json["iterations"] == 20000);
+  CHECK(json["left"] == doctest::Approx(199.9));
+  history.set_iterations(100000);
   for (int i = 2; i <= 9999; ++i) history.add(TrainRow{10 * i, 0.1 * i, 0.4, 12.0, 2000, 50.0});
   EvaluationRow test;
   test.iteration = 5000;
