@@ -39,7 +39,7 @@ void run(const Options& options) {
         fmt::format("--output {}: a .npy file holds one array and there are five, give a .npz",
                     options.output));
   }
-  const io::RayList list = io::read_rays(options.rays);
+  const io::RayList list = io::read_rays(options.rays, source.origin);
   const Gaussians gaussians = in_morton_order(read_model(source.file));
   const TraceOptions trace = options.trace.over(trace_options(source));
   if (trace.near_depth > 0.0f) {

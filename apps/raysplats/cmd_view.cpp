@@ -107,13 +107,12 @@ std::string scene_head(const ModelSource& source) {
       view::quoted(std::filesystem::absolute(source.file).string()));
 }
 
-/// Light, samples, and how tracing differs from what the model itself says.
-std::string scene_tail(const ModelSource& source, TraceOptions trace, const glm::dvec3& up) {
+/// Light, samples, and how tracing differs from what the model itself says, `own`.
+std::string scene_tail(TraceOptions own, TraceOptions trace, const glm::dvec3& up) {
   const Light light = view::page_light(up);
   std::string text = fmt::format(
       "\n[[light]]\nkind = \"directional\"\ndirection = [{}, {}, {}]\n\n[render]\nsamples = 16\n",
       light.direction[0], light.direction[1], light.direction[2]);
-  TraceOptions own = trace_options(source);
   const std::vector<OptionRow> given = trace_option_rows(trace);
   const std::vector<OptionRow> trained = trace_option_rows(own);
   std::string rows;
@@ -193,7 +192,8 @@ void view_model(const Options& options) {
   Dataset dataset;
   if (!options.data.data.empty())
     dataset = load_dataset(options.data.data, options.data.settings.over(dataset_options(source)));
-  const TraceOptions trace = options.trace.over(trace_options(source));
+  const TraceOptions own = trace_options(source);
+  const TraceOptions trace = options.trace.over(own);
   const std::vector<View> views = views_of(options, dataset);
   const std::vector<Camera> cameras = cameras_of(options, views, source);
   view::ViewState state = view::first_look(scene_extent(gaussians), cameras, up_of(options));
@@ -210,7 +210,7 @@ void view_model(const Options& options) {
       view::pictures_with_meshes(*context, view::model_pictures(*context, model, trace, mirrors),
                                  [&] { return scene_of(gaussians, trace, above); });
   view::DroppedMeshes meshes([&](const std::vector<Mesh>& shown) { pictures->set_meshes(shown); },
-                             scene_head(source), scene_tail(source, trace, above));
+                             scene_head(source), scene_tail(own, trace, above));
   state.has_near = mirrors.meshes.empty();
   state.near_depth = trace.near_depth;
   state.has_order = true;

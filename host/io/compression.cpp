@@ -19,6 +19,10 @@ constexpr int kGzipMemory = 8;        // zlib's default
 constexpr int kZstdLevel = 12;        // of SPZ's own library
 constexpr std::size_t kMostAtOnce = std::numeric_limits<uInt>::max();
 
+bool begins_member(std::span<const std::byte> bytes) {
+  return bytes.size() > 1 && bytes[0] == std::byte{0x1f} && bytes[1] == std::byte{0x8b};
+}
+
 Bytef* zlib_pointer(const std::byte* bytes) {
   return const_cast<Bytef*>(reinterpret_cast<const Bytef*>(bytes));
 }
@@ -60,7 +64,9 @@ std::size_t GzipReader::inflate_some(std::span<std::byte> out) {
     left_ = left_.subspan(in - stream.avail_in);
     written += room - stream.avail_out;
     if (status == Z_STREAM_END) {
-      ended_ = true;
+      // Anything else behind a member, such as zeros, is no part of the stream.
+      ended_ = !begins_member(left_);
+      if (!ended_) inflateReset(&stream);
     } else if (status == Z_BUF_ERROR || (status == Z_OK && left_.empty() && stream.avail_out > 0)) {
       fail("is truncated");
     } else if (status != Z_OK) {

@@ -10,7 +10,7 @@
 /// small file cannot ask for much memory.
 namespace raysplats::io {
 
-/// Inflates one gzip stream step by step.
+/// Inflates a gzip stream step by step, all members of it (RFC 1952) as one.
 class GzipReader {
  public:
   GzipReader(std::span<const std::byte> bytes, const std::filesystem::path& path);

@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kFarAway = 200.0;     // sizes of the scene; single precision has 7 digits
 constexpr double kLeastSize = 1e-6;    // of the distance: cameras in one place have no size
+constexpr double kFarAnyway = 1e4;     // units, where nothing tells the size
 constexpr double kNearest = 0.9;       // share of the cameras or points that is the scene
 constexpr double kRounding = 0x1p-24;  // of a number in single precision
 constexpr double kBlur = 0.01;         // of a detail, that is not seen
@@ -53,7 +54,9 @@ glm::dvec3 fitting_origin(std::span<const View> views, std::span<const double> p
   // 0 for no points.
   size = std::max(size, quantile(distances_to(center, points), kNearest));
   const double away = glm::length(center);
-  size = std::max(size, kLeastSize * away);
+  const double least = kLeastSize * away;
+  if (size < least && away < kFarAnyway) return glm::dvec3(0.0);
+  size = std::max(size, least);
   return away > kFarAway * size ? rounded(center, size) : glm::dvec3(0.0);
 }
 

@@ -12,7 +12,8 @@ namespace raysplats::io {
 /// Where positions should count from, so that single precision does not blur a scene that lies far
 /// from the origin of its coordinates (surveyed captures: metres of a map grid or from the earth's
 /// centre): near the median of the cameras, rounded to the scene's size, where that is more than
-/// 200 times as far away as the scene is large, else 0. `points`: x, y, z each, may be empty.
+/// 200 times as far away as the scene is large, else 0. Where all is in one place, which tells no
+/// size, that is from 10 000 units on. `points`: x, y, z each, may be empty.
 glm::dvec3 fitting_origin(std::span<const View> views, std::span<const double> points);
 
 /// The same of points alone, x, y, z each, finite: near their median, rounded to how far they

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
 #include <optional>
 #include <set>
 #include <span>
@@ -32,6 +33,7 @@
 #include "io/transforms_views.hpp"
 #include "raysplats/error.hpp"
 #include "util/file_kind.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats {
 namespace {
@@ -77,16 +79,49 @@ void sort_by_name(std::vector<View>& views) {
                    [](const View& a, const View& b) { return a.camera.name < b.camera.name; });
 }
 
-void warn_of_repeated_photos(const std::vector<View>& views) {
-  std::set<fs::path> seen;
-  std::size_t repeated = 0;
-  fs::path first;
+std::set<fs::path> photos_of(const std::vector<View>& views, bool test) {
+  std::set<fs::path> photos;
   for (const View& view : views) {
-    if (seen.insert(view.image_path).second) continue;
-    if (repeated++ == 0) first = view.image_path;
+    if (view.test == test) photos.insert(view.image_path.lexically_normal());
   }
-  if (repeated == 0) return;
-  spdlog::warn("{} photos appear in more than one frame, {} among them", repeated, first.string());
+  return photos;
+}
+
+/// Photos that are trained on measure nothing: those that are held out too are trained on no more,
+/// unless they are most of the photos.
+void part_held_out(std::vector<View>& views) {
+  const std::set<fs::path> held_out = photos_of(views, true), trained = photos_of(views, false);
+  std::vector<fs::path> shared;
+  std::set_intersection(held_out.begin(), held_out.end(), trained.begin(), trained.end(),
+                        std::back_inserter(shared));
+  if (shared.empty()) return;
+  if (2 * shared.size() > trained.size()) {
+    spdlog::warn(
+        "{} of {} held-out photos are trained on as well, {} among them, as few would be left to "
+        "train on without them: their PSNR says nothing of unseen views",
+        shared.size(), held_out.size(), shared.front().string());
+    return;
+  }
+  spdlog::warn(
+      "{} of {} photos to train on are held out too, {} among them: they are not trained on",
+      shared.size(), trained.size(), shared.front().string());
+  std::erase_if(views, [&](const View& view) {
+    return !view.test && held_out.contains(view.image_path.lexically_normal());
+  });
+}
+
+/// Of photos on both sides part_held_out() tells.
+void warn_of_repeated_photos(const std::vector<View>& views) {
+  std::set<std::pair<fs::path, bool>> seen;
+  std::set<fs::path> repeated;
+  for (const View& view : views) {
+    const fs::path photo = view.image_path.lexically_normal();
+    if (!seen.emplace(photo, view.test).second) repeated.insert(photo);
+  }
+  if (repeated.empty()) return;
+  spdlog::warn("{} in more than one frame, {} the first",
+               counted(static_cast<double>(repeated.size()), "photo is", "photos are"),
+               repeated.begin()->string());
 }
 
 /// Gives the data set the points of a PLY; returns their positions as precise as they are there.
@@ -117,7 +152,11 @@ std::optional<io::TransformsFile> held_out_file(const fs::path& root) {
     const fs::path path = root / name;
     if (!is_file(path)) continue;
     io::TransformsFile file = io::read_transforms(path);
-    if (file.frames.empty() || io::has_photos(file)) return file;
+    if (file.frames.empty()) {
+      spdlog::warn("{} has no frames: it is not used", path.string());
+      continue;
+    }
+    if (io::has_photos(file)) return file;
     spdlog::warn("{}: none of its {} photos exist, '{}' the first: it is not used", path.string(),
                  file.frames.size(), file.frames.front().file_path);
   }
@@ -329,6 +368,7 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
     throw DataError(
         fmt::format("The data set {} has no views: there is nothing to train on", root.string()));
   }
+  part_held_out(dataset.views);
   warn_of_repeated_photos(dataset.views);
   io::warn_of_color_profiles(dataset.views);
   io::warn_of_folding_lenses(dataset.views);

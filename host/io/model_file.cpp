@@ -21,6 +21,8 @@ namespace raysplats {
 namespace io {
 namespace {
 
+constexpr const char* kSogMeta = "meta.json";  // of one that is unpacked
+
 /// The first bytes of a file, fewer where it is shorter or cannot be read.
 std::string first_bytes(const std::filesystem::path& path) {
   std::array<char, 4> bytes{};
@@ -29,6 +31,13 @@ std::string first_bytes(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   stream.read(bytes.data(), bytes.size());
   return std::string(bytes.data(), static_cast<std::size_t>(stream.gcount()));
+}
+
+/// What is read of a model: of the folder of an unpacked SOG its meta.json, else the path itself.
+std::filesystem::path file_of(const std::filesystem::path& path) {
+  const std::filesystem::path meta = path / kSogMeta;
+  std::error_code error;
+  return std::filesystem::is_regular_file(meta, error) ? meta : path;
 }
 
 /// What of a model lies beyond what SPZ has codes for, and is cut.
@@ -79,7 +88,7 @@ ModelFormat model_format(const std::filesystem::path& path) {
   if (extension == ".splat") return ModelFormat::kSplat;
   if (extension == ".spz") return ModelFormat::kSpz;
   if (extension == ".glb" || extension == ".gltf") return ModelFormat::kGltf;
-  if (extension == ".sog" || path.filename() == "meta.json") return ModelFormat::kSog;
+  if (extension == ".sog" || path.filename() == kSogMeta) return ModelFormat::kSog;
   // Files that are missing, too, are best explained by the reader.
   const bool readable = !start.empty() && extension != ".ply";
   return readable ? ModelFormat::kUnknown : ModelFormat::kPly;
@@ -144,18 +153,19 @@ std::string losses(ModelFormat format, const Gaussians& model) {
 }  // namespace io
 
 Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& encoding) {
-  switch (io::model_format(path)) {
+  const std::filesystem::path file = io::file_of(path);
+  switch (io::model_format(file)) {
     case io::ModelFormat::kSplat:
-      return io::read_splat(path, encoding.drop_nonfinite);
+      return io::read_splat(file, encoding.drop_nonfinite);
     case io::ModelFormat::kGltf:
-      return io::read_gltf_gaussians(path, encoding.drop_nonfinite);
+      return io::read_gltf_gaussians(file, encoding.drop_nonfinite);
     case io::ModelFormat::kSog:
-      return io::read_sog(path);
+      return io::read_sog(file);
     case io::ModelFormat::kSpz:
-      return io::read_spz(path, encoding.spz_axes);
+      return io::read_spz(file, encoding.spz_axes);
     case io::ModelFormat::kPly:
     case io::ModelFormat::kCompressedPly:
-      return read_ply(path, encoding.drop_nonfinite);
+      return read_ply(file, encoding.drop_nonfinite);
     case io::ModelFormat::kUnknown:
       break;
   }

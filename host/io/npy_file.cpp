@@ -136,36 +136,38 @@ NumberType number_type(const std::filesystem::path& path, const std::string& nam
 }
 
 /// The number of these bytes, the lowest first.
-float to_float(std::uint64_t bits, const NumberType& type) {
-  if (type.kind == 'u') return static_cast<float>(bits);
+template <class T>
+T to_number(std::uint64_t bits, const NumberType& type) {
+  if (type.kind == 'u') return static_cast<T>(bits);
   if (type.kind == 'i') {
     const auto unused = static_cast<int>(64 - 8 * type.bytes);
-    return static_cast<float>(static_cast<std::int64_t>(bits << unused) >> unused);
+    return static_cast<T>(static_cast<std::int64_t>(bits << unused) >> unused);
   }
   if (type.bytes == 2) return glm::unpackHalf1x16(static_cast<std::uint16_t>(bits));
   if (type.bytes == 4) return std::bit_cast<float>(static_cast<std::uint32_t>(bits));
-  return static_cast<float>(std::bit_cast<double>(bits));
+  return static_cast<T>(std::bit_cast<double>(bits));
 }
 
-std::vector<float> numbers_of(std::span<const std::byte> bytes, const NumberType& type) {
-  std::vector<float> out(bytes.size() / type.bytes);
+template <class T>
+std::vector<T> numbers_of(std::span<const std::byte> bytes, const NumberType& type) {
+  std::vector<T> out(bytes.size() / type.bytes);
   for (std::size_t i = 0; i < out.size(); ++i) {
     std::uint64_t bits = 0;
     for (std::size_t k = 0; k < type.bytes; ++k) {
       const std::size_t place = type.big_endian ? type.bytes - 1 - k : k;
       bits |= std::to_integer<std::uint64_t>(bytes[i * type.bytes + place]) << (8 * k);
     }
-    out[i] = to_float(bits, type);
+    out[i] = to_number<T>(bits, type);
   }
   return out;
 }
 
 /// Numbers of which the first index runs fastest, so that the last one does.
-std::vector<float> in_c_order(const std::vector<float>& numbers,
-                              const std::vector<std::size_t>& shape) {
-  std::vector<float> out(numbers.size());
+template <class T>
+std::vector<T> in_c_order(const std::vector<T>& numbers, const std::vector<std::size_t>& shape) {
+  std::vector<T> out(numbers.size());
   std::vector<std::size_t> index(shape.size());
-  for (float& value : out) {
+  for (T& value : out) {
     std::size_t place = 0;
     for (std::size_t axis = shape.size(); axis-- > 0;) place = place * shape[axis] + index[axis];
     value = numbers[place];
@@ -218,9 +220,8 @@ std::size_t checksum(const std::string& header, std::span<const std::byte> data)
   return crc;
 }
 
-}  // namespace
-
-NpyArray read_npy(const std::filesystem::path& path) {
+template <class T>
+NpyNumbers<T> read_numbers(const std::filesystem::path& path) {
   const std::vector<std::byte> bytes = read_file(path);
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (!text.starts_with(kMagic)) fail(path, "is no .npy file: save one with numpy.save()");
@@ -241,7 +242,7 @@ NpyArray read_npy(const std::filesystem::path& path) {
   if (!description) fail(path, "has a damaged .npy header: save it again with numpy.save()");
   reader.skip(length, "the header");
   const NumberType type = number_type(path, *description->type);
-  NpyArray out;
+  NpyNumbers<T> out;
   out.shape = *description->shape;
   if (out.shape.size() > kMostDimensions) {
     fail(path,
@@ -254,9 +255,17 @@ NpyArray read_npy(const std::filesystem::path& path) {
                            "is damaged, save it again",
                            reader.remaining(), fmt::join(out.shape, ", "), count, type.bytes));
   }
-  out.data = numbers_of(std::span(bytes).subspan(reader.offset()), type);
+  out.data = numbers_of<T>(std::span(bytes).subspan(reader.offset()), type);
   if (*description->fortran) out.data = in_c_order(out.data, out.shape);
   return out;
+}
+
+}  // namespace
+
+NpyArray read_npy(const std::filesystem::path& path) { return read_numbers<float>(path); }
+
+NpyNumbers<double> read_npy_doubles(const std::filesystem::path& path) {
+  return read_numbers<double>(path);
 }
 
 void write_npz(const std::filesystem::path& path, std::span<const NpzMember> members) {

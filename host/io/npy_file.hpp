@@ -10,17 +10,22 @@
 
 namespace raysplats::io {
 
-/// Numbers of a .npy file, rounded to floats, in C order: the last index of `shape` runs fastest.
-struct NpyArray {
+/// Numbers of a .npy file, rounded to T, in C order: the last index of `shape` runs fastest.
+template <class T>
+struct NpyNumbers {
   std::vector<std::size_t> shape;
-  std::vector<float> data;
+  std::vector<T> data;
 };
+using NpyArray = NpyNumbers<float>;
 
 /// Reads a .npy file (NumPy Enhancement Proposal 1, versions 1 to 3) of floats of 16, 32 or 64 bits
 /// or whole numbers, of either byte order, in C or Fortran order. Throws DataError that names the
 /// file and what is wrong: another type, a damaged header, a file that is shorter or longer than
 /// its shape says.
 NpyArray read_npy(const std::filesystem::path& path);
+
+/// The same in double precision, as for positions that lie far from 0.
+NpyNumbers<double> read_npy_doubles(const std::filesystem::path& path);
 
 /// An array of a .npz file.
 struct NpzMember {

@@ -37,7 +37,7 @@ float to_unit(T value) {
   return clipped(to_float(value));
 }
 
-bool has_alpha(std::size_t channels) { return channels == 2 || channels == 4; }
+constexpr bool has_alpha(std::size_t channels) { return channels == 2 || channels == 4; }
 
 template <class T>
 class DecodedRows : public PhotoPixels {
@@ -62,10 +62,27 @@ class DecodedRows : public PhotoPixels {
     if (mask_ != nullptr) rgba[3] *= mask_->at(x, y, width(), height());
   }
   void row(int y, float* rgba) override {
-    for (int x = 0; x < width(); ++x, rgba += kChannels) pixel(x, y, rgba);
+    if (!std::is_integral_v<T> || mask_ != nullptr || colors_.associated || colors_.light) {
+      for (int x = 0; x < width(); ++x, rgba += kChannels) pixel(x, y, rgba);
+      return;
+    }
+    // Nearly all photos: what pixel() gives, fast enough for those of 16 megapixels.
+    const T* number = numbers_.data() +
+                      static_cast<std::size_t>(y) * static_cast<std::size_t>(width()) * channels_;
+    if (channels_ == 1) plain_row<1>(number, rgba);
+    if (channels_ == 2) plain_row<2>(number, rgba);
+    if (channels_ == 3) plain_row<3>(number, rgba);
+    if (channels_ == 4) plain_row<4>(number, rgba);
   }
 
  private:
+  template <std::size_t kOfPixel>
+  void plain_row(const T* number, float* rgba) const {
+    for (int x = 0; x < width(); ++x, number += kOfPixel, rgba += kChannels) {
+      for (std::size_t c = 0; c < 3; ++c) rgba[c] = to_float(number[kOfPixel < 3 ? 0 : c]);
+      rgba[3] = has_alpha(kOfPixel) ? to_float(number[kOfPixel - 1]) : 1.0f;
+    }
+  }
   // Alpha multiplies light, so that it is taken out before the curve.
   float color(T number, float alpha) const {
     float value = to_float(number);

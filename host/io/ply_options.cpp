@@ -13,6 +13,7 @@
 
 #include "io/ply_file.hpp"
 #include "io/ply_origin.hpp"
+#include "io/text_reader.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "scene/trace_option_table.hpp"
@@ -102,7 +103,9 @@ void for_each_line(const std::filesystem::path& path,
                    const std::function<void(const std::string&)>& take) {
   std::ifstream stream(path, std::ios::binary);
   std::string line;
-  if (!next_line(stream, line) || line != "ply") return;
+  if (!next_line(stream, line)) return;
+  if (line.starts_with(io::kByteOrderMark)) line.erase(0, io::kByteOrderMark.size());
+  if (line != "ply") return;
   for (std::size_t n = 0; n < kMaxHeaderLines && next_line(stream, line); ++n) {
     if (line == "end_header") break;
     take(line);

@@ -24,8 +24,8 @@ NpzMember member(const char* name,
 
 }  // namespace
 
-RayList read_rays(const std::filesystem::path& path) {
-  const NpyArray array = read_npy(path);
+RayList read_rays(const std::filesystem::path& path, const std::array<double, 3>& origin) {
+  const NpyNumbers<double> array = read_npy_doubles(path);
   const std::size_t width = array.shape.empty() ? 0 : array.shape.back();
   if (width != 6 && width != 8) {
     throw DataError(
@@ -38,12 +38,15 @@ RayList read_rays(const std::filesystem::path& path) {
   out.shape.assign(array.shape.begin(), array.shape.end() - 1);
   out.rays.resize(array.data.size() / width);
   for (std::size_t i = 0; i < out.rays.size(); ++i) {
-    const float* v = array.data.data() + i * width;
+    const double* v = array.data.data() + i * width;
+    Ray& ray = out.rays[i];
+    for (std::size_t k = 0; k < 3; ++k) {
+      ray.origin[k] = static_cast<float>(v[k] - origin[k]);
+      ray.direction[k] = static_cast<float>(v[3 + k]);
+    }
     const bool ends = width == 8;
-    out.rays[i] = {{v[0], v[1], v[2]},
-                   ends ? v[6] : 0.0f,
-                   {v[3], v[4], v[5]},
-                   ends ? v[7] : std::numeric_limits<float>::infinity()};
+    ray.t_min = ends ? static_cast<float>(v[6]) : 0.0f;
+    ray.t_max = ends ? static_cast<float>(v[7]) : std::numeric_limits<float>::infinity();
   }
   return out;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <filesystem>
 #include <span>
@@ -17,9 +18,10 @@ struct RayList {
 };
 
 /// Reads a .npy file of shape (..., 6) or (..., 8): origin and direction of every ray, and with 8
-/// numbers t_min and t_max behind them; else a ray begins at 0 and has no end. Throws DataError as
+/// numbers t_min and t_max behind them; else a ray begins at 0 and has no end. The rays count from
+/// `origin` (Dataset::origin), which is taken off in double precision. Throws DataError as
 /// read_npy(), and for another shape.
-RayList read_rays(const std::filesystem::path& path);
+RayList read_rays(const std::filesystem::path& path, const std::array<double, 3>& origin = {});
 
 /// Writes what rays met as a .npz file: "color" (..., 3), "alpha", "depth", "median_depth" as
 /// 32-bit floats, "hits" as 32-bit whole numbers, of the shape that the rays came in. Throws

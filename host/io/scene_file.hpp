@@ -28,6 +28,8 @@ glm::dmat4 scene_transform(const glm::dvec3& scale,
 struct SceneModel {
   std::filesystem::path file;  ///< as read_model(), or the folder of a training run
   glm::dmat4 transform{1.0};
+  /// From the scene's origin to its own (find_models()), before `transform`.
+  glm::dvec3 offset{0.0};
   std::string place;  ///< "FILE, line N" for messages
 };
 

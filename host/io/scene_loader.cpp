@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <map>
 #include <set>
@@ -36,7 +37,7 @@ Gaussians load_gaussians(const SceneFile& file) {
         found != read.end() ? found->second
                             : read.emplace(model.file, read_model(model.file)).first->second;
     try {
-      placed.push_back(transformed(gaussians, model.transform));
+      placed.push_back(transformed(gaussians, glm::translate(model.transform, model.offset)));
     } catch (const UsageError& error) {
       throw UsageError(fmt::format("{}: {}", model.place, error.what()));
     }

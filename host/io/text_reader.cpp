@@ -36,7 +36,8 @@ std::string excerpt(std::string_view text, std::size_t most) {
 
 TextReader::TextReader(std::span<const std::byte> bytes, std::filesystem::path path)
     : text_(reinterpret_cast<const char*>(bytes.data()), bytes.size()), path_(std::move(path)) {
-  if (text_.starts_with(kByteOrderMark)) text_.remove_prefix(kByteOrderMark.size());
+  if (text_.starts_with(kByteOrderMark)) mark_ = kByteOrderMark.size();
+  text_.remove_prefix(mark_);
 }
 
 bool TextReader::next_line() {

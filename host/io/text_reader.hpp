@@ -34,8 +34,8 @@ class TextReader {
   /// Moves to the next line that is neither blank nor a comment (#).
   bool next_content_line();
   bool at_end() const { return next_ >= text_.size(); }
-  /// Start of the line after the current one, in bytes.
-  std::size_t next_offset() const { return next_; }
+  /// Start of the line after the current one, in bytes of all that was given.
+  std::size_t next_offset() const { return mark_ + next_; }
 
   /// The next word of the line; "" at its end.
   std::string_view word();
@@ -51,6 +51,7 @@ class TextReader {
   std::string_view text_;
   std::filesystem::path path_;
   std::string_view line_;
+  std::size_t mark_ = 0;  // bytes in front of text_
   std::size_t next_ = 0;
   std::size_t line_number_ = 0;
 };

@@ -82,6 +82,29 @@ bool hits_differ(const ModelSource& a, const ModelSource& b) {
   return hits_of(a) != hits_of(b);
 }
 
+// Lays models that count from different origins beside each other as their files have them.
+// Nothing is known of those without an origin, nor of any where the scene has none.
+void set_offsets(SceneFile& scene,
+                 const std::vector<ModelSource>& sources,
+                 const std::array<double, 3>& origin) {
+  constexpr std::array<double, 3> kNone{};
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    const std::array<double, 3>& own = sources[i].origin;
+    glm::dvec3& offset = scene.models[i].offset;
+    offset = glm::dvec3(0.0);
+    if (own == kNone || own == origin) continue;
+    if (origin == kNone) {
+      spdlog::info("{} counts from {}, the scene from no origin: its numbers are taken as they are",
+                   sources[i].file.string(), fmt::join(own, ", "));
+      continue;
+    }
+    offset = glm::dvec3(own[0], own[1], own[2]) - glm::dvec3(origin[0], origin[1], origin[2]);
+    spdlog::info("{} counts from {}, the scene from {}: it is moved by {}, {}, {} first",
+                 sources[i].file.string(), fmt::join(own, ", "), fmt::join(origin, ", "), offset.x,
+                 offset.y, offset.z);
+  }
+}
+
 // What somebody who named a folder without a run may have meant.
 std::string meant(const std::filesystem::path& folder) {
   std::error_code error;
@@ -201,6 +224,7 @@ void find_models(SceneFile& scene) {
   scene.trained.sky = transformed(
       scene.trained.sky, scene.models[static_cast<std::size_t>(first - sources.begin())].transform);
   scene.trained_data = dataset_options(*first);
+  set_offsets(scene, sources, first->origin);
   if (std::any_of(sources.begin(), sources.end(),
                   [&](const ModelSource& source) { return hits_differ(source, *first); })) {
     spdlog::info("all models are traced as {} wants it, although others want it otherwise",

@@ -53,6 +53,7 @@ TraceOptions trace_options(const ModelSource& source);
 
 /// Replaces run folders among a scene's models by their newest PLY, and makes the options of the
 /// first model that tells them what the scene's [trace] and the data sets of its [camera] go over.
+/// The scene counts from that model's origin; others that have one get their offset from there.
 /// Throws as find_model().
 void find_models(SceneFile& scene);
 

@@ -29,8 +29,8 @@ struct ModelEncoding {
 };
 
 /// Reads Gaussians from a 3DGS PLY, PlayCanvas' compressed PLY and SOG, .splat, SPZ (1 to 4) or
-/// glTF with KHR_gaussian_splatting, recognised by their first bytes, .splat by its name. glTF is
-/// turned to the y down of captures. Throws DataError for anything malformed, truncated, oversized
+/// glTF with KHR_gaussian_splatting, recognised by their first bytes, .splat by its name; of a SOG
+/// that is unpacked its folder or its meta.json. glTF is turned to the y down of captures. Throws DataError for anything malformed, truncated, oversized
 /// or, unless `encoding` drops them, with numbers that are not finite.
 Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& encoding = {});
 

@@ -250,6 +250,7 @@ TEST_CASE("one or two photos are trained on, with a warning of what they leave o
   const Outcome one = train(data, folder / "one");
   check_trains(one, "warning: 1 training view of " + data);
   check_trains(one, "no view is held out, so nothing is measured");
+  CHECK_FALSE(contains(one.err + one.out, "--test-every"));
   keep_photos(data, 0, false);
   check_refusal(train(data, folder / "none", {"-q"}), 3, "has no views");
 }
@@ -260,7 +261,7 @@ TEST_CASE("a run without test views says that nothing is measured") {
   make_data(data);
   keep_photos(data, 4, false);
   const Outcome outcome = train(data, folder / "run", {"--test-every", "0"});
-  check_trains(outcome, "no view is held out, so nothing is measured");
+  check_trains(outcome, "so nothing is measured: --test-every 8 holds some out");
   CHECK_FALSE(contains(outcome.out, "PSNR"));
   check_refusal(train(data, folder / "all", {"-q", "--test-every", "1"}), 2,
                 "--test-every 1 holds all of them out");

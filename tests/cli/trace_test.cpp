@@ -5,6 +5,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,17 @@ TEST_CASE("rays of a file are traced into a file") {
   std::memcpy(alpha, bytes.data() + end + 1, sizeof(alpha));
   CHECK(alpha[0] == doctest::Approx(0.5).epsilon(1e-4));
   CHECK(alpha[1] == 0.0f);
+
+  // Rays are in the files' coordinates, from which the model's origin is taken off.
+  write_ply(folder / "far.ply", model, std::nullopt, {1000, 2000, 3000});
+  write_npy(folder / "rays.npy", "False", "(2, 6)",
+            {1000, 2000, 2997, 0, 0, 1, 1005, 2000, 2997, 0, 0, 1});
+  std::vector<std::string> of_survey = arguments;
+  of_survey[1] = folder / "far.ply";
+  std::filesystem::remove(folder / "seen.npz");
+  CHECK(raysplats_program(of_survey).code == 0);
+  std::ifstream moved(folder / "seen.npz", std::ios::binary);
+  CHECK(bytes == std::string((std::istreambuf_iterator<char>(moved)), {}));
 
   std::vector<std::string> one_array = arguments;
   one_array[5] = folder / "seen.npy";

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+import shutil
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,14 @@ def test_other_formats(tmp_path, arrays, name):
     assert np.abs(found - expected).max() < 0.01
     with pytest.raises(rs.UsageError):
         g.save(tmp_path / "a.obj")
+
+
+def test_a_sog_is_read_from_its_folder(tmp_path, arrays):
+    as_gaussians(arrays).save(tmp_path / "a.sog")
+    shutil.unpack_archive(tmp_path / "a.sog", tmp_path / "unpacked", "zip")
+    packed, unpacked = (rs.Gaussians.load(tmp_path / name) for name in ("a.sog", "unpacked"))
+    assert np.array_equal(unpacked.means, packed.means)
+    assert np.array_equal(unpacked.sh, packed.sh)
 
 
 def test_errors_say_what_and_where(tmp_path):

@@ -6,6 +6,7 @@ import json
 import math
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -58,6 +59,19 @@ class CamerasTest(unittest.TestCase):
                 file.write('[{"position": [0]}]')
             with Viewer(PROGRAM, [run]) as viewer:
                 self.assertEqual(json.loads(viewer.ask("/api/state", Cookie=viewer.cookie())[2])["cameras"], [])
+
+
+class ForeignTest(unittest.TestCase):
+    def test_how_a_foreign_model_is_traced_is_said_once(self):
+        with tempfile.TemporaryDirectory(prefix="raysplats_foreign_") as folder:
+            model = os.path.join(folder, "model.ply")
+            write_model(model)
+            with subprocess.Popen([PROGRAM, "view", model, "--port", "0"], stdout=subprocess.PIPE,
+                                  stderr=subprocess.PIPE, text=True) as process:
+                process.stdout.readline()
+                process.send_signal(signal.SIGINT)
+                told = "".join(process.communicate(timeout=30))
+            self.assertEqual(told.count("does not say how it is traced"), 1, told)
 
 
 class OriginTest(unittest.TestCase):

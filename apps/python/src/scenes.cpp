@@ -120,7 +120,9 @@ void bind_material(nb::module_& module) {
             m.kind = value_of(kMaterialKinds, "kind", name);
           },
           "'diffuse', 'mirror', 'glass', 'transparent' or 'emissive'.")
-      .def_rw("color", &Material::color)
+      .def_rw("color", &Material::color,
+              "0.8 unless it is given, of mirrors and glass too: clear ones have (1, 1, 1), as "
+              "scene files give them.")
       .def_rw("texture", &Material::texture, "Index of the scene's textures; -1 = none.")
       .def_rw("specular", &Material::specular)
       .def_rw("roughness", &Material::roughness)

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <span>
 #include <vector>
 
 #include "raysplats/io.hpp"
@@ -85,6 +86,35 @@ TEST_CASE("a scene far from the origin of its files is counted from where it is"
   }
 }
 
+TEST_CASE("cameras in one place without points count from 0 unless they are far away") {
+  const glm::dvec3 place(3, -1, 2);
+  std::vector<View> views(5);
+  const auto stand = [&](const glm::dvec3& at) {
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const glm::dquat turn =
+          glm::angleAxis(0.7 * static_cast<double>(i), glm::normalize(glm::dvec3(1, 2, 3)));
+      Camera& camera = views[i].camera;
+      camera.rotation = glm::mat3_cast(turn);
+      // In one place but for rounding, to single precision as other programs do.
+      for (int k = 0; k < 3; ++k)
+        camera.translation[k] = static_cast<float>(-(camera.rotation * at)[k]);
+    }
+  };
+  for (const double scale : {1.0, 100.0, 2000.0}) {
+    CAPTURE(scale);
+    stand(scale * place);
+    CHECK(io::fitting_origin(views, {}) == glm::dvec3(0.0));
+    CHECK(io::fitting_origin(std::span(views).first(1), {}) == glm::dvec3(0.0));
+    // Points tell the size.
+    std::vector<double> points;
+    for (int i = 0; i < 30; ++i) points.push_back(scale * (place[i % 3] + 0.001 * (i % 7 - 3)));
+    const glm::dvec3 origin = io::fitting_origin(views, points);
+    CHECK(glm::distance(origin, scale * place) < 0.01 * scale);
+  }
+  stand(1e6 * place);
+  CHECK(glm::distance(io::fitting_origin(views, {}), 1e6 * place) < 10.0);
+}
+
 TEST_CASE("the origin of a PLY is read back to the bit, and 0 is not written") {
   const Scratch scratch;
   Gaussians model;
@@ -93,6 +123,10 @@ TEST_CASE("the origin of a PLY is read back to the bit, and 0 is not written") {
   write_ply(scratch / "far.ply", model, TraceOptions{}, origin);
   CHECK(read_ply_origin(scratch / "far.ply") == origin);
   CHECK(read_ply_options(scratch / "far.ply").has_value());
+  // Behind a byte order mark too.
+  write_bytes(scratch / "marked.ply", "\xEF\xBB\xBF" + read_bytes(scratch / "far.ply"));
+  CHECK(read_ply_origin(scratch / "marked.ply") == origin);
+  CHECK(read_ply_options(scratch / "marked.ply").has_value());
   write_ply(scratch / "alone.ply", model, std::nullopt, origin);
   CHECK(read_ply_origin(scratch / "alone.ply") == origin);
   CHECK_FALSE(read_ply_options(scratch / "alone.ply").has_value());

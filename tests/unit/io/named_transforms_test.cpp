@@ -88,3 +88,32 @@ TEST_CASE("a test file of Blender's without its photos is left out, which is tol
   CHECK(load_dataset(scratch.path()).views.size() == 3);
   CHECK(load_dataset(scratch.path()).indices(Split::kTest) == std::vector<std::size_t>{0});
 }
+
+TEST_CASE("a test file of Blender's without frames counts as none, which is told") {
+  const Scratch scratch;
+  write_scene(scratch, "transforms_train.json", "train", 3, 50);
+  write_scene(scratch, "transforms_test.json", "test", 0, 50);
+  const LogCapture log;
+  CHECK(load_dataset(scratch.path()).indices(Split::kTest) == std::vector<std::size_t>{0});
+  CHECK(log.contains("transforms_test.json has no frames: it is not used"));
+}
+
+TEST_CASE("photos of a test file of Blender's are not trained on, unless they are most of all") {
+  const Scratch scratch;
+  write_scene(scratch, "transforms_train.json", "photos", 4, 50);
+  write_scene(scratch, "transforms_test.json", "photos", 2, 50);
+  {
+    const LogCapture log;
+    const Dataset dataset = load_dataset(scratch.path());
+    REQUIRE(dataset.views.size() == 4);
+    CHECK(dataset.views.front().camera.name == "photos/2.png");
+    CHECK(dataset.indices(Split::kTest) == std::vector<std::size_t>{2, 3});
+    CHECK(log.contains("2 of 4 photos to train on are held out too"));
+  }
+  write_scene(scratch, "transforms_test.json", "photos", 4, 50);
+  const LogCapture log;
+  CHECK(load_dataset(scratch.path()).views.size() == 8);
+  CHECK(log.contains("4 of 4 held-out photos are trained on as well"));
+  CHECK(log.contains("says nothing of unseen views"));
+  CHECK(log.lines() == 1);
+}

@@ -236,6 +236,13 @@ TEST_CASE("rays are read with and without ends, and results keep their shape") {
   CHECK(one.rays[0].t_min == 0);
   CHECK(one.rays[0].t_max == std::numeric_limits<float>::infinity());
 
+  // From an origin that single precision would round by 0.25.
+  const std::vector<double> far{400000.5, 5000000.25, 3, 0, 0.1, 1};
+  std::ofstream(path, std::ios::binary) << npy(header("<f8", "False", "(6,)"), raw(far));
+  const Ray moved = io::read_rays(path, {400000, 5000000, 5}).rays.at(0);
+  CHECK(std::vector(moved.origin, moved.origin + 3) == std::vector<float>{0.5f, 0.25f, -2.0f});
+  CHECK(std::vector(moved.direction, moved.direction + 3) == std::vector<float>{0, 0.1f, 1});
+
   std::vector<RayResult> results(2);
   results[0] = {{0.1f, 0.2f, 0.3f}, 0.4f, 5, 6, 7, 0};
   results[1] = {{1.1f, 1.2f, 1.3f}, 1.4f, 15, 16, 17, 1};

@@ -174,7 +174,8 @@ TEST_CASE("every byte order, number type and property order gives the same model
   CHECK(model.sh_degree == 1);
   CHECK(model.size() == count);
   CHECK(static_cast<double>(model.means[3]) == value(1, properties.size() - 1));
-  for (const std::string& text : {big, small, ascii}) {
+  const std::string mark = "\xEF\xBB\xBF";  // of editors of Windows
+  for (const std::string& text : {big, small, ascii, mark + little, mark + ascii}) {
     write_bytes(scratch / "other.ply", text);
     const Gaussians other = read_ply(scratch / "other.ply");
     CHECK(other.means == model.means);
@@ -192,6 +193,16 @@ TEST_CASE("an empty model can be written and read, and a zero quaternion means n
   std::string text = header("ascii", 1, kProperties) + "1 2 3 0 0 0 0 0 0 0 0 0 0 0\n";
   write_bytes(scratch / "zero.ply", text);
   CHECK(read_ply(scratch / "zero.ply").quaternions == std::vector<float>{1, 0, 0, 0});
+}
+
+TEST_CASE("quaternions whose squares leave single precision are normalised when they are read") {
+  const Scratch scratch;
+  const std::string begin = "1 2 3 0 0 0 0 0 0 0 ";
+  const std::string rows =
+      begin + "3e-25 0 0 -4e-25\n" + begin + "0 3e25 4e25 0\n" + begin + "0 0 3 4\n";
+  write_bytes(scratch / "a.ply", header("ascii", 3, kProperties) + rows);
+  CHECK(read_ply(scratch / "a.ply").quaternions ==
+        std::vector<float>{0.6f, 0, 0, -0.8f, 0, 0.6f, 0.8f, 0, 0, 0, 3, 4});
 }
 
 TEST_CASE("the 3D filter of Mip-Splatting goes into scales and opacities") {

@@ -137,6 +137,7 @@ TEST_CASE("SOG: known textures are read, from a zip archive and unpacked") {
   for (const auto& [name, bytes] : sog.files) write_bytes(scratch / name, text_of(bytes));
   write_bytes(scratch / "meta.json", sog.meta.dump());
   check_known(read_model(scratch / "meta.json"));
+  check_known(read_model(scratch.path()));
 }
 
 TEST_CASE("SOG: archives of other writers leave sizes out of local headers, or deflate") {

@@ -131,6 +131,21 @@ TEST_CASE("SPZ: known bytes of versions 3 and 4 are read, and written again") {
   CHECK(read_bytes(scratch / "four.spz") == version4());
 }
 
+TEST_CASE("SPZ: a gzip stream may have several members, and other bytes behind them") {
+  const std::string raw = version3();
+  for (const std::size_t cut : {std::size_t{5}, std::size_t{16}, std::size_t{30}, raw.size()}) {
+    CAPTURE(cut);
+    const std::string members = gzipped(raw.substr(0, cut)) + gzipped(raw.substr(cut));
+    check_known(read(members));
+    check_known(read(gzipped("") + members + std::string(8, '\0')));
+    CHECK(contains(error_of(members + gzipped("x")), "holds more"));
+    CHECK(contains(error_of(members + gzipped(std::string(1 << 20, 'x'))), "holds more"));
+    CHECK(contains(error_of(members + bytes_of({0x1f, 0x8b})), "truncated"));
+    CHECK(contains(error_of(members + bytes_of({0x1f, 0x8b, 0, 0})), "damaged"));
+  }
+  CHECK(contains(error_of(gzipped(raw.substr(0, 20)) + gzipped(raw.substr(20, 4))), "holds less"));
+}
+
 TEST_CASE("SPZ: versions 1 and 2 have half floats and three bytes of rotation") {
   const std::string rest = kAlpha + kColor + kScale;
   const Gaussians two =

@@ -528,14 +528,41 @@ TEST_CASE(
   CHECK(log.lines() == 0);
 }
 
-TEST_CASE("a photo that frames share is told") {
+TEST_CASE("a photo that frames share is told, and measures nothing where it is trained on") {
   const Scratch scratch;
-  write_image(scratch / "a.png", Image(10, 10, 3));
-  write_bytes(scratch / "transforms.json", file_of("\"w\": 10, \"h\": 10, \"fl_x\": 20, ",
-                                                   frame("a.png", 0) + "," + frame("a.png", 1)));
+  for (const char* name : {"a.png", "b.png"}) write_image(scratch / name, Image(10, 10, 3));
+  const auto write_frames = [&](const std::string& frames) {
+    write_bytes(scratch / "transforms.json",
+                file_of("\"w\": 10, \"h\": 10, \"fl_x\": 20, ", frames));
+  };
+  const auto loaded = [&](int test_every) {
+    DatasetOptions options;
+    options.test_every = test_every;
+    return load_dataset(scratch.path(), options);
+  };
+  // The second names the file in another way.
+  const std::string twice = frame("a.png", 0) + "," + frame("./a.png", 1);
+  write_frames(twice);
+  {
+    const LogCapture log;
+    CHECK(loaded(0).views.size() == 2);
+    CHECK(log.contains("1 photo is in more than one frame"));
+    CHECK(log.lines() == 1);
+  }
+  {
+    const LogCapture log;
+    CHECK(loaded(8).views.size() == 2);
+    CHECK(log.contains("1 of 1 held-out photos are trained on as well"));
+    CHECK(log.lines() == 1);
+  }
+  write_frames(twice + "," + frame("b.png", 2));
   const LogCapture log;
-  CHECK(load_dataset(scratch.path()).views.size() == 2);
-  CHECK(log.contains("more than one frame"));
+  const Dataset dataset = loaded(8);
+  REQUIRE(dataset.views.size() == 2);
+  CHECK(dataset.indices(Split::kTest) == std::vector<std::size_t>{0});
+  CHECK(dataset.views[1].camera.name == "b.png");
+  CHECK(log.contains("1 of 2 photos to train on are held out too"));
+  CHECK(log.lines() == 1);
 }
 
 TEST_CASE("points beside Blender's files are taken") {

@@ -5,12 +5,16 @@
 
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <string>
+#include <vector>
 
+#include "io/scene_loader.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "run/run_folder.hpp"
 #include "run/train_config.hpp"
+#include "scene/gaussian_transform.hpp"
 #include "unit/log_capture.hpp"
 #include "unit/temporary_directory.hpp"
 
@@ -161,6 +165,51 @@ TEST_CASE("a scene has the origin and the data settings of its first model that 
   CHECK(scene.trained_data.origin == origin);
   CHECK(scene.trained_data.downscale == 4.0);
   CHECK(scene.trained_data.test_every == 3);
+}
+
+TEST_CASE("models that count from different origins lie in a scene as in their files") {
+  const TemporaryDirectory folder;
+  Gaussians tile;
+  tile.resize(2);
+  tile.means = {0.5f, -0.25f, 1.0f, 0.75f, 2.0f, -1.5f};
+  const std::array<double, 3> origin{400000.125, 5e6, 0.0};
+  write_ply(folder.path() / "a.ply", tile, std::nullopt, origin);
+  write_ply(folder.path() / "b.ply", tile, std::nullopt, {400003.125, 5e6, -1.0});
+  Gaussians beside = tile;
+  for (std::size_t i = 0; i < beside.size(); ++i) {
+    beside.means[3 * i] += 3.0f;
+    beside.means[3 * i + 2] -= 1.0f;
+  }
+  const std::vector<Gaussians> tiles{tile, beside};
+  write_ply(folder.path() / "one.ply", joined(tiles), std::nullopt, origin);
+  write_ply(folder.path() / "statue.ply", tile);
+  // Where the means of a scene of these models are, each with the keys `more`.
+  const auto means = [&](const std::vector<std::string>& models, const std::string& more) {
+    std::ofstream stream(folder.path() / "scene.toml");
+    for (const std::string& model : models)
+      stream << "[[model]]\nfile = '" << model << "'\n" << more << "\n";
+    stream << "[camera]\nposition = [0, 0, -3]\ntarget = [0, 0, 0]\n";
+    stream.close();
+    SceneFile scene = read_scene_file(folder.path() / "scene.toml");
+    find_models(scene);
+    find_models(scene);  // no model is moved twice
+    return load_scene(scene).scene.gaussians.means;
+  };
+  for (const char* more : {"", "scale = 2\ntranslate = [1, 2, 3]"}) {
+    CAPTURE(more);
+    const LogCapture log;
+    CHECK(means({"a.ply", "b.ply"}, more) == means({"one.ply"}, more));
+    CHECK(log.contains("b.ply counts from 400003.125, 5000000, -1, the scene from 400000.125"));
+    CHECK(log.contains("it is moved by 3, 0, -1 first"));
+  }
+  // Of what has no origin nothing is known, as of all where the scene has none.
+  const LogCapture log;
+  const std::vector<float> twice = means({"statue.ply", "statue.ply"}, "");
+  CHECK(means({"a.ply", "statue.ply"}, "") == twice);
+  CHECK(means({"a.ply", "a.ply"}, "") == twice);
+  CHECK_FALSE(log.contains("counts from"));
+  CHECK(means({"statue.ply", "b.ply"}, "") == twice);
+  CHECK(log.contains("b.ply counts from 400003.125, 5000000, -1, the scene from no origin"));
 }
 
 TEST_CASE("options in a PLY that nobody can trace with are named") {

@@ -8,6 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <filesystem>
@@ -94,6 +95,27 @@ TEST_CASE("atomic file: a library may write the temporary file itself") {
   std::ofstream(file.temporary(), std::ios::binary) << "pixels";
   file.commit();
   CHECK(read_bytes(folder / "image.png") == "pixels");
+}
+
+TEST_CASE("atomic file: a name may be as long as names can be") {
+  const TemporaryDirectory folder;
+  std::string letters;  // of two bytes each, so that any cut could fall into one
+  while (letters.size() < 250) letters += "\u00e4";
+  for (const std::string& name : {letters + "x.ply", "y" + letters + ".ply", "z." + letters}) {
+    CAPTURE(name);
+    AtomicFile file(folder / name);
+    const std::string temporary = file.temporary().filename().string();
+    CHECK(temporary.size() <= 160);
+    std::size_t whole = 0;
+    for (std::size_t i = 0; i + 1 < temporary.size(); ++i)
+      whole += temporary.compare(i, 2, "\u00e4") == 0 ? 1 : 0;
+    CHECK(std::count(temporary.begin(), temporary.end(), '\xc3') == static_cast<long>(whole));
+    file.write("text");
+    file.commit();
+    CHECK(read_bytes(folder / name) == "text");
+    AtomicFile left(folder / name);
+    CHECK(remove_stale_temporaries(folder.path()) == 1);
+  }
 }
 
 TEST_CASE("atomic file: folders are made, bytes are kept as they are") {
