@@ -158,7 +158,7 @@ RenderViews file_views(const RenderFlags& options, const ModelSource& source) {
     for (Camera& camera : path.cameras) io::move_origin(camera, origin);
     views = {std::move(path.cameras), path.fps, path.closed};
   }
-  const double factor = options.data.settings.over({}).downscale;
+  const double factor = options.data.settings.over({}).factor();
   for (Camera& camera : views.cameras) camera = downscaled(camera, factor);
   return views;
 }

@@ -6,6 +6,7 @@
 #include <exception>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <set>
 #include <system_error>
 
@@ -86,21 +87,30 @@ ChosenKeys check_choices(const CLI::App& command, Options& options) {
 }
 
 Dataset load(const CLI::App& command, Options& options, const DeviceInfo& device) {
-  Dataset dataset = load_dataset(options.data, options.train.data);
-  if (options.quality.empty()) return dataset;
-  const QualityChoice choice = choose_quality(parse_quality(options.quality), dataset, device.type);
-  // On the command line, or by a --config.
-  const TrainOptions usual;
-  const auto given = [&](const char* name) { return command.get_option(name)->count() > 0; };
-  if (!given("--iterations") && options.train.iterations == usual.iterations)
-    options.train.iterations = choice.iterations;
-  const bool sized = given("--downscale") || options.train.data.downscale != usual.data.downscale;
-  if (sized || choice.downscale == 1) return dataset;
-  options.train.data.downscale = choice.downscale;
-  spdlog::info(
-      "Photos are reduced {} times each way, as --quality {} does; --downscale 1 keeps them",
-      choice.downscale, options.quality);
-  return load_dataset(options.data, options.train.data);
+  DatasetOptions& data = options.train.data;
+  Dataset dataset = load_dataset(options.data, data);
+  // On the command line, by a --config or the run that goes on.
+  const bool sized = data.downscale > 0;
+  if (options.quality.empty()) {
+    if (sized) return dataset;
+    std::optional<double> seconds;
+    if (!options.time.empty()) seconds = parse_duration("--time", options.time);
+    data.downscale = fitting_downscale(dataset, device.type, seconds);
+  } else {
+    const QualityChoice choice =
+        choose_quality(parse_quality(options.quality), dataset, device.type);
+    const bool given = command.get_option("--iterations")->count() > 0;
+    if (!given && options.train.iterations == TrainOptions().iterations)
+      options.train.iterations = choice.iterations;
+    if (sized) return dataset;
+    data.downscale = choice.downscale;
+  }
+  if (data.downscale == 1) return dataset;
+  spdlog::info("Photos are reduced {:.3g} times each way{}; --downscale 1 keeps them",
+               data.downscale,
+               options.quality.empty() ? ", because they are large"
+                                       : ", as --quality " + options.quality + " does");
+  return load_dataset(options.data, data);
 }
 
 /// Sets the length of a run by --time, and says beforehand how long it will take. Returns its

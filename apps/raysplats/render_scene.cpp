@@ -120,7 +120,7 @@ Pace override_camera(const RenderFlags& flags, SceneFile& scene) {
     camera.file = flags.cameras;
   }
   if (data || camera.source == Source::kFile) camera.place = scene.path.string();
-  if (!data) scene.downscale = flags.data.settings.over({}).downscale;
+  if (!data) scene.downscale = flags.data.settings.over({}).factor();
   pace.closed |= camera.source == Source::kOrbit;
   return pace;
 }

@@ -15,6 +15,23 @@ namespace {
 // Squares of distances have to stay within single precision, and scenes are near their cameras,
 // which may be no farther than this either.
 constexpr double kFarthestOrigin = 1e9;
+constexpr double kMostDownscale = 1024;
+
+void add_downscale_option(OptionTable& table, DatasetOptions& options) {
+  table.add(
+      "downscale",
+      "image sizes are divided by this; auto = 1, but to train on photos that are more than a "
+      "quarter larger than 1600 pixels on their longer side (with --time on fewer, by the time) "
+      "what reduces them to that, which the run's configuration then names",
+      [&options](const OptionTable::Values& values) {
+        const std::string& value = option_value("downscale", values);
+        options.downscale =
+            value == "auto" ? 0 : option_number<double>("downscale", value, 1, kMostDownscale);
+      },
+      [&options] {
+        return options.downscale == 0 ? toml_text("auto") : fmt::format("{}", options.downscale);
+      });
+}
 
 void add_origin_option(OptionTable& table, DatasetOptions& options) {
   table.add(
@@ -46,7 +63,7 @@ void add_origin_option(OptionTable& table, DatasetOptions& options) {
 }  // namespace
 
 void add_data_options(OptionTable& table, DatasetOptions& options) {
-  table.number("downscale", options.downscale, 1, 1024, "image sizes are divided by this");
+  add_downscale_option(table, options);
   table.number("test-every", options.test_every, 0, 1e9,
                "every n-th view is held out when the data set has no split of its own; 0 = none");
   table.flag("undistort", options.undistort,

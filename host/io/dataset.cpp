@@ -346,7 +346,9 @@ std::vector<std::size_t> Dataset::indices(Split split) const {
   return out;
 }
 
-Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
+Dataset load_dataset(const fs::path& path, const DatasetOptions& given) {
+  DatasetOptions options = given;
+  if (given.downscale == 0) options.downscale = 1;
   if (!(options.downscale >= 1 && options.downscale <= 1024)) {
     throw UsageError(fmt::format("The downscale factor is {}: it must lie between 1 and 1024",
                                  options.downscale));

@@ -32,10 +32,14 @@ constexpr int kLeastDepth = 2;
 constexpr double kLeastCover = 0.25;
 // Of all columns or rows, those that show something: bodies before a black ground are narrower.
 constexpr double kLeastShown = 0.5;
-// Between its deepest and its least deep column, but for a tenth at either end, as a share of the
-// photo's size.
+// Between its deepest and its least deep column, but for a twelfth at either end, as a share of
+// the photo's size; and where black columns beside it are more than the ends of bent edges, which
+// windows have and round bodies that fill a photo.
 constexpr double kMostBend = 0.1;
-constexpr std::size_t kBentEnds = 10;
+constexpr double kMostBendOfWindow = 0.01;
+constexpr double kBesideWindow = 0.2;
+constexpr std::size_t kBentEnds = 12;
+// Of the columns of all photos, those in which something is shown just where the border ends.
 constexpr double kLeastAgreement = 0.5;
 
 enum Side : std::size_t { kTop, kBottom, kLeft, kRight };
@@ -121,10 +125,13 @@ bool is_border(const std::vector<int>& depths, int most, bool bends) {
   const auto covered = static_cast<double>(std::count_if(partly.begin(), partly.end(), covers));
   if (partly.empty() || covered < kLeastCover * count) return false;
   if (bends) return true;
-  if (count < kLeastShown * static_cast<double>(depths.size())) return false;
+  const auto all = static_cast<double>(depths.size());
+  if (count < kLeastShown * all) return false;
   std::sort(partly.begin(), partly.end());
   const std::size_t end = partly.size() / kBentEnds;
-  return partly[partly.size() - 1 - end] - partly[end] <= kMostBend * most;
+  const double bend = partly[partly.size() - 1 - end] - partly[end];
+  const bool window = all - count > kBesideWindow * all;
+  return bend <= (window ? kMostBendOfWindow * most + 1 : kMostBend * most);
 }
 
 // Whether most photos show something just where the border ends.

@@ -282,7 +282,7 @@ std::vector<Camera> scene_cameras(const SceneCamera& camera,
     case Source::kFile: {
       std::vector<Camera> cameras =
           chosen(camera, io::read_model_cameras(camera.file, origin_of(trained)));
-      const double factor = camera.data_settings.over({}).downscale;
+      const double factor = camera.data_settings.over({}).factor();
       for (Camera& each : cameras) each = downscaled(each, factor);
       return cameras;
     }

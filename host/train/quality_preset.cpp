@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -28,6 +29,20 @@ constexpr std::array<Level, 4> kLevels{{{4, 300, 1000, 240},
                                         {120, 10000, 30000, 1600}}};
 constexpr int kFasterDevices = 2;  // times that side elsewhere
 
+constexpr double kLongestSide = 1600;
+constexpr double kSideOfSecond = 215;  // on CPUs; steps cost as pixels do
+constexpr double kLeastDownscale = 1.25;
+
+// Of the usual photo to train on: a panorama among phone photos must not shrink them all.
+int longest_side(const Dataset& dataset) {
+  std::vector<double> sides;
+  for (const std::size_t i : dataset.indices(Split::kTrain)) {
+    const Camera& camera = dataset.views[i].camera;
+    sides.push_back(std::max(camera.width, camera.height));
+  }
+  return sides.empty() ? 1 : std::max(1, static_cast<int>(median(std::move(sides))));
+}
+
 }  // namespace
 
 const std::vector<std::string>& quality_names() {
@@ -47,22 +62,25 @@ Quality parse_quality(const std::string& name) {
 
 QualityChoice choose_quality(Quality quality, const Dataset& dataset, DeviceType device) {
   const Level& level = kLevels[static_cast<std::size_t>(quality)];
-  const std::vector<std::size_t> views = dataset.indices(Split::kTrain);
-  // Of the usual photo: a panorama among phone photos must not shrink them all.
-  std::vector<double> sides;
-  for (const std::size_t i : views) {
-    const Camera& camera = dataset.views[i].camera;
-    sides.push_back(std::max(camera.width, camera.height));
-  }
-  const int longest = std::max(1, static_cast<int>(median(std::move(sides))));
+  const std::size_t views = dataset.indices(Split::kTrain).size();
+  const int longest = longest_side(dataset);
   const int side = level.side * (device == DeviceType::kCpu ? 1 : kFasterDevices);
   QualityChoice out;
   // Few photos are known by heart before the least of a level is over.
-  const std::int64_t least = std::min(level.least, run_length({}, views.size()));
-  out.iterations =
-      std::clamp(level.passes * static_cast<std::int64_t>(views.size()), least, level.most);
+  const std::int64_t least = std::min(level.least, run_length({}, views));
+  out.iterations = std::clamp(level.passes * static_cast<std::int64_t>(views), least, level.most);
   out.downscale = (longest + side - 1) / side;
   return out;
+}
+
+double fitting_downscale(const Dataset& dataset, DeviceType device, std::optional<double> seconds) {
+  double side = kLongestSide;
+  if (seconds) {
+    const double faster = device == DeviceType::kCpu ? 1 : kFasterDevices;
+    side = std::clamp(faster * kSideOfSecond * std::sqrt(*seconds), 1.0, side);
+  }
+  const double factor = longest_side(dataset) / side;
+  return factor >= kLeastDownscale ? factor : 1.0;
 }
 
 }  // namespace raysplats

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,5 +30,12 @@ struct QualityChoice {
 /// lower of which gives way to what few photos ask for (run_length()); photos are reduced as the
 /// median one of their longest sides asks for, which may be half as long on CPUs as elsewhere.
 QualityChoice choose_quality(Quality quality, const Dataset& dataset, DeviceType device);
+
+/// By what the sizes of photos are divided where nobody says. The longer side of the usual photo of
+/// `dataset`, which is at its full size, is reduced to 1600 pixels, as in 3DGS; of a run of so many
+/// `seconds` to fewer, so that it sees each photo more than once. 1 where that is little less.
+double fitting_downscale(const Dataset& dataset,
+                         DeviceType device,
+                         std::optional<double> seconds = std::nullopt);
 
 }  // namespace raysplats

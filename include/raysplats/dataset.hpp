@@ -98,8 +98,10 @@ struct Dataset {
 
 /// How a data set is read.
 struct DatasetOptions {
-  double downscale = 1.0;  ///< COLMAP: images_N is used when it exists, the rest is resampled
-  int test_every = 8;      ///< every n-th view of a data set without a split of its own; 0 = none
+  /// By what image sizes are divided; 0 stands for 1, which `train` changes where photos are large.
+  /// COLMAP: images_N is used when it exists, the rest is resampled.
+  double downscale = 0;
+  int test_every = 8;  ///< every n-th view of a data set without a split of its own; 0 = none
   /// true: photos through lenses with distortion (kOpenCv) become pinhole pictures; false: they
   /// keep their pixels and their model. Other models cannot become pinholes without loss and keep
   /// theirs either way; lenses that no ray knows (kPhotoLens) are taken out either way.
@@ -111,6 +113,9 @@ struct DatasetOptions {
   /// What is taken off all positions; none = 0, but a point near the cameras where the scene lies
   /// so far from the origin of its files (surveyed captures) that single precision would blur it.
   std::optional<std::array<double, 3>> origin;
+
+  /// What sizes are divided by.
+  double factor() const { return downscale > 0 ? downscale : 1.0; }
 };
 
 /// Detects the kind of data set (COLMAP, nerfstudio, Blender, LLFF, Polycam) and reads everything

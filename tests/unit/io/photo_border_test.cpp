@@ -174,14 +174,19 @@ TEST_CASE("what is black without being a border counts") {
   };
   // Round, and as wide as the photo's half.
   const auto standing_ball = [](int, int x, int y) { return std::hypot(x - 32, y - 24) > 20; };
+  // A can that turns: its edges are those of a window, but for the bent rim.
+  const auto standing_can = [](int, int x, int y) {
+    const double u = (x + 0.5 - 32) / 22;
+    return std::abs(u) > 1 || std::abs(y + 0.5 - 24) > 15 + 5 * std::sqrt(1 - u * u);
+  };
   const auto night_sky = [](int photo, int, int y) { return y < 8 + 5 * (photo % 5); };
   const auto hill_at_night = [](int, int x, int y) { return y < 4 + x / 2; };
   const auto one_row = [](int, int, int y) { return y < 1; };
   const auto nothing = [](int, int, int) { return false; };
   const auto everything = [](int, int, int) { return true; };
-  for (const Black& black :
-       {Black(moving_body), Black(standing_body), Black(standing_ball), Black(night_sky),
-        Black(hill_at_night), Black(one_row), Black(nothing), Black(everything)}) {
+  for (const Black& black : {Black(moving_body), Black(standing_body), Black(standing_ball),
+                             Black(standing_can), Black(night_sky), Black(hill_at_night),
+                             Black(one_row), Black(nothing), Black(everything)}) {
     const Scratch scratch;
     write_photos(scratch, black);
     CHECK_FALSE(has_borders(scratch));

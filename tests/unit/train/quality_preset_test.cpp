@@ -3,6 +3,8 @@
 
 #include <doctest/doctest.h>
 
+#include <optional>
+
 #include "raysplats/error.hpp"
 
 using namespace raysplats;
@@ -39,4 +41,29 @@ TEST_CASE("higher qualities train longer on larger photos, within the capture's 
   for (View& view : dataset.views) view.camera.width = 135, view.camera.height = 240;
   dataset.views[3].camera.width = 2160, dataset.views[3].camera.height = 3840;
   CHECK(choose_quality(Quality::kLow, dataset, DeviceType::kCpu).downscale == 1);
+}
+
+TEST_CASE("large photos are reduced to a size that trainers expect, or that a time allows [tiny]") {
+  Dataset dataset;
+  dataset.views.resize(9);
+  const auto sized = [&](int width, int height) {
+    for (View& view : dataset.views) view.camera.width = width, view.camera.height = height;
+  };
+  const auto factor = [&](std::optional<double> seconds = std::nullopt,
+                          DeviceType device = DeviceType::kCpu) {
+    return fitting_downscale(dataset, device, seconds);
+  };
+  sized(3000, 4000);
+  CHECK(factor() == 2.5);
+  CHECK(factor(std::nullopt, DeviceType::kGpu) == 2.5);
+  CHECK(factor(3600.0) == 2.5);
+  CHECK(factor(25.0) == doctest::Approx(4000.0 / 1075));
+  CHECK(factor(25.0, DeviceType::kGpu) == 2.5);
+  // One large photo among small ones says nothing of them, and a little is not worth blurring.
+  sized(1920, 1080);
+  dataset.views[4].camera.width = 8000;
+  CHECK(factor() == 1.0);
+  sized(480, 270);
+  CHECK(factor(5.0) == 1.0);
+  CHECK(factor(1.0) == doctest::Approx(480.0 / 215));
 }
