@@ -2,18 +2,22 @@
 #include "bench/kernel_folders.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <set>
 #include <utility>
 
 #include "bench/bench_cases.hpp"
 #include "bench/scene_bench.hpp"
 #include "light/view_tracer.hpp"
 #include "scene/pixel_count.hpp"
+#include "scene/trace_option_table.hpp"
+#include "trace/packet_layout.hpp"
 #include "trace/ray_tracer.hpp"
 #include "train/adam.hpp"
 #include "train/image_loss.hpp"
@@ -73,6 +77,40 @@ std::vector<NamedNumbers> results_of(Context& context,
   add_step(context, model, trace, "tiles, ", out);
   trace.traversal = Traversal::kBvh;
   add_step(context, model, trace, "tree, ", out);
+  return out;
+}
+
+// Rows whose results are those of results_of() or go into them.
+std::set<std::string> compared_rows(const DeviceInfo& device, const TraceOptions& trace) {
+  const PacketLayout packet = packet_layout(device, trace);
+  const std::string shape = packet_shape_name(packet.subgroups ? PacketShape::kSubgroup
+                                              : packet.grouped ? PacketShape::kGroup
+                                                               : PacketShape::kVector);
+  return {"sort",
+          "bounds",
+          "order",
+          "nodes",
+          "build",
+          "prepare-view",
+          "tile-lists",
+          "forward",
+          "view",
+          "view-bvh",
+          "backward",
+          "finalize",
+          "loss-gradient",
+          "adam",
+          "forward-" + shape,
+          "backward-" + shape};
+}
+
+// Each name once, in the order of the rows.
+std::vector<std::string> uncompared_rows(const BenchReport& report,
+                                         std::set<std::string> compared) {
+  std::vector<std::string> out;
+  for (const BenchRow& row : report.rows) {
+    if (compared.insert(row.name).second) out.push_back(row.name);
+  }
   return out;
 }
 
@@ -179,6 +217,7 @@ KernelComparison compare_kernels(const DeviceInfo& device,
     right.add_rows(model, after);
   }
   out.rows = compare_reports(before, after);
+  out.uncompared = uncompared_rows(before, compared_rows(first.device(), options.trace));
   return out;
 }
 
@@ -189,8 +228,15 @@ std::string kernel_comparison_table(const KernelComparison& comparison) {
     out += fmt::format("{}: {} of {} numbers differ, by {:.2e} of the largest\n", result.name,
                        result.differing, result.numbers, result.largest);
   }
-  if (comparison.equal())
-    out += fmt::format("all {} results are equal to the last bit\n", comparison.results.size());
+  if (comparison.equal()) {
+    out += fmt::format(
+        "the {} pictures, gradients and parameters after a step are equal to the last bit\n",
+        comparison.results.size());
+  }
+  if (!comparison.uncompared.empty()) {
+    out += fmt::format("what these rows yield besides is not compared, but by the tests: {}\n",
+                       fmt::join(comparison.uncompared, ", "));
+  }
   return out + comparison_table(comparison.rows);
 }
 

@@ -22,14 +22,17 @@ struct ResultDifference {
 struct KernelComparison {
   std::vector<ResultDifference> results;
   BenchComparison rows;
+  /// Names of the timed rows that yield something besides, which is not compared.
+  std::vector<std::string> uncompared;
 
   bool equal() const;
 };
 
-/// Compares the kernels of two folders like cl/: first what they compute on every scene (with sums
-/// in the same order every time), then the time of every row, in turns within one process.
-/// `context_options` are those of both contexts but for the folder. Throws DeviceError for a folder
-/// that lacks a kernel or has one that does not compile, UsageError as run_bench().
+/// Compares the kernels of two folders like cl/: first pictures, gradients and parameters after a
+/// step on every scene (with sums in the same order every time), then the time of every row, in
+/// turns within one process. `context_options` are those of both contexts but for the folder.
+/// Throws DeviceError for a folder that lacks a kernel or has one that does not compile, UsageError
+/// as run_bench().
 KernelComparison compare_kernels(const DeviceInfo& device,
                                  const ContextOptions& context_options,
                                  const std::string& folder,

@@ -54,12 +54,15 @@ void append(const std::string& path,
 
 }  // namespace
 
-std::string resolve_kernel_source(const std::string& path, const std::string& directory) {
+std::string kernel_folder(const std::string& directory) {
   const char* named = std::getenv("RAYSPLATS_KERNEL_DIR");
-  const std::string place = !directory.empty() || named == nullptr ? directory : named;
+  return !directory.empty() || named == nullptr ? directory : named;
+}
+
+std::string resolve_kernel_source(const std::string& path, const std::string& directory) {
   std::set<std::string> seen;
   std::string out;
-  append(path, place, seen, out);
+  append(path, kernel_folder(directory), seen, out);
   return out;
 }
 

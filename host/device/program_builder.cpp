@@ -322,12 +322,15 @@ cl::Program ProgramBuilder::compile(const Build& build) const {
                     build.path, memory_limit_remark()));
   } catch (const cl::Error& error) {
     const std::string log = build_log(*program, device_);
-    const std::string trouble = driver_trouble(info_.platform);
+    const std::string folder = kernel_folder(options_.kernel_directory);
+    std::string remedy = driver_trouble(info_.platform);
+    // Built-in kernels are right; those of a folder are its owner's.
+    if (remedy.empty())
+      remedy = folder.empty() ? "update the driver or choose another --device" : "correct it";
     throw DeviceError(
-        fmt::format("Kernel file {} does not compile on {} with '{}' ({}): {}{}{}", build.path,
-                    info_.name, build.flags, cl_error_name(error.err()),
-                    trouble.empty() ? "update the driver or choose another --device" : trouble,
-                    log.empty() ? "" : "\n", log));
+        fmt::format("Kernel file {}{}{} does not compile on {} with '{}' ({}): {}{}{}", folder,
+                    folder.empty() ? "" : "/", build.path, info_.name, build.flags,
+                    cl_error_name(error.err()), remedy, log.empty() ? "" : "\n", log));
   }
   if (spdlog::should_log(spdlog::level::debug)) {
     const std::string log = build_log(*program, device_);

@@ -281,11 +281,16 @@ void leave_out_borders(Dataset& dataset) {
   const auto has_border = [](const View& view) { return view.border != nullptr; };
   const auto first = std::find_if(dataset.views.begin(), dataset.views.end(), has_border);
   if (first == dataset.views.end()) return;
-  spdlog::info(
-      "{} of {} photos have the same black border, of {:.0f} % of the pixels of {}, as the bars of "
-      "a video: it does not count (with borders = keep it is a part of the scene)",
-      std::count_if(dataset.views.begin(), dataset.views.end(), has_border), dataset.views.size(),
-      std::max(1.0, 100.0 * io::hidden_share(*first->border)), first->image_path.string());
+  // Of bars; a vertical video between them has more.
+  constexpr double kUsualShare = 0.4;
+  const double share = io::hidden_share(*first->border);
+  spdlog::log(
+      share > kUsualShare ? spdlog::level::warn : spdlog::level::info,
+      "photos of the size of {} have the same black border, of {:.0f} % of their pixels, as the "
+      "bars of a video: in {} of {} photos it does not count (with borders = keep it is a part of "
+      "the scene)",
+      first->image_path.string(), std::max(1.0, 100.0 * share),
+      std::count_if(dataset.views.begin(), dataset.views.end(), has_border), dataset.views.size());
 }
 
 /// What nerfstudio makes of a capture has COLMAP's model in a folder of its own. Its file says more

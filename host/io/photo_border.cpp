@@ -3,8 +3,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
-#include <cstdint>
+#include <glm/geometric.hpp>
+#include <glm/mat2x2.hpp>
+#include <glm/matrix.hpp>
+#include <glm/vec2.hpp>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -19,6 +24,7 @@
 #include "scene/even_choice.hpp"
 #include "scene/photo_lens.hpp"
 #include "util/parallel.hpp"
+#include "util/srgb.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -32,15 +38,22 @@ constexpr int kLeastDepth = 2;
 constexpr double kLeastCover = 0.25;
 // Of all columns or rows, those that show something: bodies before a black ground are narrower.
 constexpr double kLeastShown = 0.5;
-// Between its deepest and its least deep column, but for a twelfth at either end, as a share of
-// the photo's size; and where black columns beside it are more than the ends of bent edges, which
-// windows have and round bodies that fill a photo.
-constexpr double kMostBend = 0.1;
-constexpr double kMostBendOfWindow = 0.01;
-constexpr double kBesideWindow = 0.2;
+// A side is straight but for a twelfth at either end, or bent and narrow, as edges are whose lens
+// was taken out; as shares of the photo's size. Bodies that turn have bent or slanted sides.
+constexpr double kMostBend = 0.005;
+constexpr double kMostBentDepth = 0.07;
 constexpr std::size_t kBentEnds = 12;
 // Of the columns of all photos, those in which something is shown just where the border ends.
-constexpr double kLeastAgreement = 0.5;
+constexpr double kLeastAgreement = 0.6;
+// The circle of a fisheye: how far ends may lie off it and how large it is at least, as shares of
+// the photo's shorter side, and the share of the ends that lie on it.
+constexpr double kMostOffCircle = 0.02;
+constexpr double kLeastRadius = 0.4;
+constexpr double kLeastOnCircle = 0.8;
+// Of a photo: a vertical video between bars has less.
+constexpr double kMostHidden = 0.75;
+// Of what a border hides of a photo: one that shows more there has none.
+constexpr double kMostShown = 0.1;
 
 enum Side : std::size_t { kTop, kBottom, kLeft, kRight };
 constexpr std::size_t kSides = 4;
@@ -61,11 +74,12 @@ struct Edges {
 template <class T>
 class DarkPixels {
  public:
-  DarkPixels(const RawImage& photo, const std::vector<T>& numbers)
+  DarkPixels(const RawImage& photo, const std::vector<T>& numbers, bool light)
       : numbers_(numbers),
         width_(static_cast<std::size_t>(photo.width)),
         channels_(static_cast<std::size_t>(photo.channels)),
         colors_(channels_ < 3 ? 1 : 3) {
+    if (light) black_ = light_from_display(black_);
     if constexpr (std::is_integral_v<T>) black_ *= static_cast<double>(static_cast<T>(-1));
   }
   bool dark(int x, int y) const {
@@ -81,8 +95,8 @@ class DarkPixels {
 };
 
 template <class T>
-Edges edges_of(const RawImage& photo, const std::vector<T>& numbers) {
-  const DarkPixels<T> pixels(photo, numbers);
+Edges edges_of(const RawImage& photo, const std::vector<T>& numbers, bool light) {
+  const DarkPixels<T> pixels(photo, numbers, light);
   Edges out{photo.width, photo.height, {}};
   const auto measure = [&](Side side, int count, const auto& dark) {
     out.depths[side].resize(static_cast<std::size_t>(count));
@@ -100,10 +114,18 @@ Edges edges_of(const RawImage& photo, const std::vector<T>& numbers) {
   return out;
 }
 
+// Whether the numbers of a photo are proportional to light; only floats are.
+bool is_light(const RawImage& photo, const View& view) {
+  return std::holds_alternative<std::vector<float>>(photo.numbers) &&
+         image_codec().photo_colors(view.image_path.string()).light;
+}
+
 std::optional<Edges> edges_of(const View& view) {
   try {
     const RawImage photo = read_photo(view).raw;
-    return std::visit([&](const auto& numbers) { return edges_of(photo, numbers); }, photo.numbers);
+    const bool light = is_light(photo, view);
+    return std::visit([&](const auto& numbers) { return edges_of(photo, numbers, light); },
+                      photo.numbers);
   } catch (const Error&) {
     return std::nullopt;  // who needs the photo says what is wrong with it
   }
@@ -114,29 +136,35 @@ bool is_fisheye(const Camera& photo) {
          (photo.lens && photo.lens->form == PhotoLens::Form::kFisheye);
 }
 
-// Whether a border may look so, by the depths of a side, of which `most` is all of the photo.
-bool is_border(const std::vector<int>& depths, int most, bool bends) {
-  std::vector<int> partly;
-  for (const int depth : depths) {
-    if (depth < most) partly.push_back(depth);
-  }
+// Depths of the columns or rows that show something, of which `most` is all of the photo.
+std::vector<int> partly(const std::vector<int>& depths, int most) {
+  std::vector<int> out;
+  std::copy_if(depths.begin(), depths.end(), std::back_inserter(out),
+               [&](int depth) { return depth < most; });
+  return out;
+}
+
+// Whether so much of a side is black that it may have a border.
+bool is_covered(const std::vector<int>& depths, int most) {
+  const std::vector<int> shown = partly(depths, most);
   const auto covers = [](int depth) { return depth >= kLeastDepth; };
-  const auto count = static_cast<double>(partly.size());
-  const auto covered = static_cast<double>(std::count_if(partly.begin(), partly.end(), covers));
-  if (partly.empty() || covered < kLeastCover * count) return false;
-  if (bends) return true;
-  const auto all = static_cast<double>(depths.size());
-  if (count < kLeastShown * all) return false;
-  std::sort(partly.begin(), partly.end());
-  const std::size_t end = partly.size() / kBentEnds;
-  const double bend = partly[partly.size() - 1 - end] - partly[end];
-  const bool window = all - count > kBesideWindow * all;
-  return bend <= (window ? kMostBendOfWindow * most + 1 : kMostBend * most);
+  const auto covered = static_cast<double>(std::count_if(shown.begin(), shown.end(), covers));
+  return !shown.empty() && covered >= kLeastCover * static_cast<double>(shown.size());
+}
+
+bool is_straight(const std::vector<int>& depths, int most) {
+  std::vector<int> shown = partly(depths, most);
+  if (static_cast<double>(shown.size()) < kLeastShown * static_cast<double>(depths.size()))
+    return false;
+  std::sort(shown.begin(), shown.end());
+  const std::size_t end = shown.size() / kBentEnds;
+  const int least = shown[end], deepest = shown[shown.size() - 1 - end];
+  return deepest - least <= 1 + kMostBend * most || deepest <= kMostBentDepth * most;
 }
 
 // Whether most photos show something just where the border ends.
 bool is_agreed(const std::vector<int>& depths, std::span<const Edges> photos, Side side, int most) {
-  const int slack = 2 + most / 100;
+  const int slack = 2 + most / 200;
   std::size_t asked = 0, agreed = 0;
   for (std::size_t i = 0; i < depths.size(); ++i) {
     if (depths[i] == most || depths[i] < kLeastDepth) continue;
@@ -146,9 +174,8 @@ bool is_agreed(const std::vector<int>& depths, std::span<const Edges> photos, Si
   return static_cast<double>(agreed) >= kLeastAgreement * static_cast<double>(asked);
 }
 
-// How deep the border of one side is, by column or row; empty where it has none.
-std::vector<int> common_depths(std::span<const Edges> photos, Side side, bool fisheye) {
-  const int most = photos.front().depth_of(side);
+// How deep all photos are black on one side, by column or row.
+std::vector<int> common_depths(std::span<const Edges> photos, Side side) {
   std::vector<int> out(photos.front().depths[side].size());
   std::vector<int> found(photos.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
@@ -158,21 +185,98 @@ std::vector<int> common_depths(std::span<const Edges> photos, Side side, bool fi
     std::nth_element(found.begin(), least, found.end());
     out[i] = *least;
   }
-  if (!is_border(out, most, fisheye) || !is_agreed(out, photos, side, most)) return {};
-  // Pictures are blurred where a border ends, and dark at the rim of a fisheye.
-  const int margin = 1 + most / (fisheye ? 200 : 1000);
-  for (int& depth : out) {
-    if (depth >= kLeastDepth) depth = std::min(depth + margin, most);
-  }
   return out;
+}
+
+// Where something begins behind what is black from the photo's edges.
+std::vector<glm::dvec2> ends_of(const Edges& edges) {
+  std::vector<glm::dvec2> out;
+  const auto add = [&](Side side, const auto& place) {
+    for (std::size_t i = 0; i < edges.depths[side].size(); ++i) {
+      const int depth = edges.depths[side][i];
+      if (depth >= kLeastDepth && depth < edges.depth_of(side))
+        out.push_back(place(static_cast<double>(i) + 0.5, static_cast<double>(depth)));
+    }
+  };
+  add(kTop, [](double i, double depth) { return glm::dvec2(i, depth); });
+  add(kBottom, [&](double i, double depth) { return glm::dvec2(i, edges.height - depth); });
+  add(kLeft, [](double i, double depth) { return glm::dvec2(depth, i); });
+  add(kRight, [&](double i, double depth) { return glm::dvec2(edges.width - depth, i); });
+  return out;
+}
+
+struct Circle {
+  glm::dvec2 center{0.0};
+  double radius = 0;
+
+  double off(const glm::dvec2& point) const {
+    return std::abs(glm::distance(point, center) - radius);
+  }
+};
+
+// Least squares of |p|^2 = 2 c p + r^2 - |c|^2 (Kasa 1976), about the points' mean.
+Circle fitted_circle(std::span<const glm::dvec2> points) {
+  glm::dvec2 mean(0.0);
+  for (const glm::dvec2& p : points) mean += p / static_cast<double>(points.size());
+  glm::dmat2 squares(0.0);
+  glm::dvec2 moments(0.0);
+  double size = 0;
+  for (const glm::dvec2& p : points) {
+    const glm::dvec2 d = p - mean;
+    squares += glm::outerProduct(d, d);
+    moments += d * glm::dot(d, d) / 2.0;
+    size += glm::dot(d, d) / static_cast<double>(points.size());
+  }
+  if (!(std::abs(glm::determinant(squares)) > 0)) return {};
+  const glm::dvec2 center = glm::inverse(squares) * moments;
+  return {mean + center, std::sqrt(glm::dot(center, center) + size)};
+}
+
+// Whether what is black lies around the circle of a fisheye, which a photo may cut.
+bool is_circle(const Edges& edges) {
+  std::vector<glm::dvec2> ends = ends_of(edges);
+  const double side = std::min(edges.width, edges.height);
+  if (static_cast<double>(ends.size()) < kLeastCover * side) return false;
+  const std::size_t all = ends.size();
+  Circle circle = fitted_circle(ends);
+  // Once more without what is dark beside it.
+  std::erase_if(ends,
+                [&](const glm::dvec2& p) { return circle.off(p) > 2 * kMostOffCircle * side; });
+  if (ends.size() < 3) return false;
+  circle = fitted_circle(ends);
+  const auto on = std::count_if(ends.begin(), ends.end(), [&](const glm::dvec2& p) {
+    return circle.off(p) <= kMostOffCircle * side;
+  });
+  return circle.radius >= kLeastRadius * side &&
+         static_cast<double>(on) >= kLeastOnCircle * static_cast<double>(all);
 }
 
 bool is_full(const std::vector<int>& depths, int most) {
   return std::find(depths.begin(), depths.end(), most) != depths.end();
 }
 
+// What hides the border that photos agree about; empty where a side has none.
+std::array<std::vector<int>, kSides> hidden_depths(std::span<const Edges> photos, bool fisheye) {
+  Edges common{photos.front().width, photos.front().height, {}};
+  for (const Side side : {kTop, kBottom, kLeft, kRight})
+    common.depths[side] = common_depths(photos, side);
+  const bool circle = fisheye && is_circle(common);
+  for (const Side side : {kTop, kBottom, kLeft, kRight}) {
+    std::vector<int>& depths = common.depths[side];
+    const int most = common.depth_of(side);
+    const bool border = is_covered(depths, most) && (circle || is_straight(depths, most)) &&
+                        is_agreed(depths, photos, side, most);
+    if (!border) depths.clear();
+    // Pictures are blurred where a border ends, and dark at the rim of a circle.
+    const int margin = 1 + most / (circle ? 200 : 1000);
+    for (int& depth : depths) {
+      if (depth >= kLeastDepth) depth = std::min(depth + margin, most);
+    }
+  }
+  return common.depths;
+}
+
 std::shared_ptr<const PhotoBorder> common_border(std::span<const View* const> photos) {
-  const bool fisheye = is_fisheye(photos.front()->source_camera);
   std::vector<const View*> chosen;
   for (const std::size_t i : even_choice(photos.size(), kMostPhotos)) chosen.push_back(photos[i]);
   std::vector<Edges> edges;
@@ -184,7 +288,7 @@ std::shared_ptr<const PhotoBorder> common_border(std::span<const View* const> ph
       edges.push_back(std::move(*found));
   }
   const auto may_have = [&](Side side) {
-    return is_border(edges.front().depths[side], edges.front().depth_of(side), fisheye);
+    return is_covered(edges.front().depths[side], edges.front().depth_of(side));
   };
   if (edges.empty()) return nullptr;
   if (!may_have(kTop) && !may_have(kBottom) && !may_have(kLeft) && !may_have(kRight))
@@ -195,19 +299,18 @@ std::shared_ptr<const PhotoBorder> common_border(std::span<const View* const> ph
     if (tells(found)) edges.push_back(std::move(*found));
   }
   if (edges.size() < kLeastPhotos) return nullptr;
-  PhotoBorder border{common_depths(edges, kTop, fisheye), common_depths(edges, kBottom, fisheye),
-                     common_depths(edges, kLeft, fisheye), common_depths(edges, kRight, fisheye)};
+  auto [top, bottom, left, right] = hidden_depths(edges, is_fisheye(photos.front()->source_camera));
   const int width = edges.front().width, height = edges.front().height;
   // Rows that are black altogether are of bars above and below, or all of it is a black ground.
-  const bool above = !border.top.empty() || !border.bottom.empty();
-  const bool beside = !border.left.empty() || !border.right.empty();
-  if (!above && (is_full(border.left, width) || is_full(border.right, width))) return nullptr;
-  if (!beside && (is_full(border.top, height) || is_full(border.bottom, height))) return nullptr;
+  const bool above = !top.empty() || !bottom.empty(), beside = !left.empty() || !right.empty();
+  if (!above && (is_full(left, width) || is_full(right, width))) return nullptr;
+  if (!beside && (is_full(top, height) || is_full(bottom, height))) return nullptr;
   if (!above && !beside) return nullptr;
-  border.top.resize(static_cast<std::size_t>(width));
-  border.bottom.resize(border.top.size());
-  border.left.resize(static_cast<std::size_t>(height));
-  border.right.resize(border.left.size());
+  for (std::vector<int>* columns : {&top, &bottom})
+    columns->resize(static_cast<std::size_t>(width));
+  for (std::vector<int>* rows : {&left, &right}) rows->resize(static_cast<std::size_t>(height));
+  PhotoBorder border{std::move(top), std::move(bottom), std::move(left), std::move(right)};
+  if (hidden_share(border) > kMostHidden) return nullptr;
   return std::make_shared<const PhotoBorder>(std::move(border));
 }
 
@@ -237,6 +340,32 @@ double hidden_share(const PhotoBorder& border) {
       hidden += border.hides(static_cast<int>(x), static_cast<int>(y)) ? 1 : 0;
   }
   return static_cast<double>(hidden) / static_cast<double>(width * height);
+}
+
+bool has_border(const RawImage& photo, const View& view) {
+  if (!view.border) return false;
+  const bool light = is_light(photo, view);
+  // Without the margin at its end.
+  const int margin = 1 + std::max(photo.width, photo.height) / 200;
+  PhotoBorder inner = *view.border;
+  for (std::vector<int>* depths : {&inner.top, &inner.bottom, &inner.left, &inner.right}) {
+    for (int& depth : *depths) depth -= margin;
+  }
+  std::size_t hidden = 0, shown = 0;
+  std::visit(
+      [&](const auto& numbers) {
+        using Number = typename std::decay_t<decltype(numbers)>::value_type;
+        const DarkPixels<Number> pixels(photo, numbers, light);
+        for (int y = 0; y < photo.height; ++y) {
+          for (int x = 0; x < photo.width; ++x) {
+            if (!inner.hides(x, y)) continue;
+            ++hidden;
+            shown += pixels.dark(x, y) ? 0 : 1;
+          }
+        }
+      },
+      photo.numbers);
+  return static_cast<double>(shown) <= kMostShown * static_cast<double>(hidden);
 }
 
 }  // namespace raysplats::io

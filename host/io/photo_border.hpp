@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "io/image_codec.hpp"
 #include "raysplats/dataset.hpp"
 
 namespace raysplats::io {
@@ -12,9 +13,14 @@ namespace raysplats::io {
 /// size tell, evenly spread, and one that has no black edge tells at once; fewer than three tell of
 /// nothing, and what cannot be read of nothing either.
 ///
-/// A border ends in the same places in at least half of the photos, and, but for fisheyes, along
-/// nearly straight lines: a black ground around a body, or a night sky, does not.
+/// A border ends in the same places in most of these photos, along straight lines, bent ones near
+/// the photo's edge, or on the circle of a fisheye: a black ground around a body, or a night sky,
+/// seldom does.
 void find_borders(std::vector<View>& views);
+
+/// Whether the photo of a view has the border that was found in others, and shows no more than
+/// letters there: of two videos of one size one may have bars.
+bool has_border(const RawImage& photo, const View& view);
 
 /// Of the photo's pixels, those that the border takes.
 double hidden_share(const PhotoBorder& border);

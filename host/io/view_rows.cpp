@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "io/image_file.hpp"
+#include "io/photo_border.hpp"
 #include "io/photo_orientation.hpp"
 
 namespace raysplats::io {
@@ -47,7 +48,7 @@ ViewRows::ViewRows(const View& view) {
     unchanged_ = false;
   }
   auto pixels = decoded_rows(raw_, masked ? &mask_ : nullptr, colors);
-  if (view.border) {
+  if (has_border(raw_, view)) {
     pixels = bordered_rows(std::move(pixels), view.border);
     unchanged_ = false;
   }

@@ -30,6 +30,9 @@ constexpr std::size_t kRayBytes = sizeof(Ray) + sizeof(RayResult) +
 constexpr std::size_t kLeastBatch = 4096;
 static_assert(sizeof(RayResultGradient) == sizeof(RayBackward::ResultGradient));
 
+// Where the square leaves single precision, kernels let a ray meet nothing.
+constexpr float kLongestDirection = 1e19f;
+
 bool finite(const float (&v)[3]) {
   return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
 }
@@ -37,12 +40,15 @@ bool finite(const float (&v)[3]) {
 // As the kernels take it: an infinite end is the largest number.
 Ray checked(const Ray& ray, std::size_t number) {
   const float* d = ray.direction;
+  const float squares = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
   const char* fault = nullptr;
   if (!finite(ray.origin) || !finite(ray.direction) || std::isnan(ray.t_max) ||
       !std::isfinite(ray.t_min)) {
     fault = "has a number that is not finite";
-  } else if (!(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] >= std::numeric_limits<float>::min())) {
+  } else if (!(squares >= std::numeric_limits<float>::min())) {
     fault = "has a direction of length 0";
+  } else if (!(squares <= kLongestDirection * kLongestDirection)) {
+    fault = "has a direction whose length is beyond 1e19";
   } else if (!(ray.t_min >= 0.0f)) {
     fault = "begins before its origin";
   } else if (ray.t_min > ray.t_max) {
@@ -123,6 +129,26 @@ struct Tracer::Impl {
         "TraceOptions::near_depth is {}, but single rays have no camera that could be near: use 0",
         options.near_depth));
   }
+  void require_picture() const {
+    if (width == 0) throw UsageError("There is no picture yet: call Tracer::render() first");
+  }
+  // Of calls from what watches a picture: they would use what it is being made with.
+  void require_idle() const {
+    if (!rendering) return;
+    throw UsageError(
+        "The tracer is rendering: call it after that, not from what hears the share that is done");
+  }
+  // Marks the tracer as rendering while it lives.
+  struct Rendering {
+    explicit Rendering(Impl& impl) : flag(impl.rendering) {
+      impl.require_idle();
+      flag = true;
+    }
+    ~Rendering() { flag = false; }
+    Rendering(const Rendering&) = delete;
+    Rendering& operator=(const Rendering&) = delete;
+    bool& flag;
+  };
   void trace_batch(const DeviceGaussians& gaussians, std::size_t first, std::size_t count);
   RaysGradients backward(const DeviceGaussians& gaussians,
                          std::span<const RayBackward::ResultGradient> gradients);
@@ -134,6 +160,7 @@ struct Tracer::Impl {
   RayTracer tracer;
   RayBackward sums;
   std::optional<NormalPictures> normals;  // once they are wanted
+  bool rendering = false;
   // The last picture.
   int width = 0;
   int height = 0;
@@ -166,6 +193,7 @@ Image Tracer::render(const Model& model,
                      const std::function<bool(double)>& within) {
   Impl& self = *impl_;
   const auto lock = self.context.lock();
+  const Impl::Rendering rendering(self);
   self.width = self.height = 0;
   const Watch watch(self.views, within);
   try {
@@ -193,7 +221,7 @@ std::array<int, 2> Tracer::rows() const {
 Image Tracer::depth() const {
   const Impl& self = *impl_;
   const auto lock = self.context.lock();
-  if (self.width == 0) throw UsageError("There is no picture yet: call Tracer::render() first");
+  self.require_picture();
   return self.views.download_depth();
 }
 
@@ -202,6 +230,7 @@ Image Tracer::normals(const Model& model,
                       const std::function<bool(double)>& within) {
   Impl& self = *impl_;
   const auto lock = self.context.lock();
+  const Impl::Rendering rendering(self);
   if (self.mirrors)
     throw UsageError("A picture with mirrors has no single normal: leave out the mirrors");
   if (!self.normals) self.normals.emplace(self.context, self.options);
@@ -220,14 +249,20 @@ Image Tracer::normals(const Model& model,
 ViewGradients Tracer::backward(const Model& model, const Image& gradient) {
   Impl& self = *impl_;
   const auto lock = self.context.lock();
+  self.require_idle();
   const DeviceGaussians& gaussians = gaussians_of(model, self.context);
-  if (gradient.width != self.width || gradient.height != self.height || gradient.channels != 4 ||
-      gradient.data.size() != 4 * gradient.pixels()) {
+  self.require_picture();
+  if (gradient.width != self.width || gradient.height != self.height || gradient.channels != 4) {
     throw UsageError(
         fmt::format("The gradient of a picture of {} x {} pixels and 4 channels has {} x {} and "
                     "{}: give one of "
                     "the picture's size",
                     self.width, self.height, gradient.width, gradient.height, gradient.channels));
+  }
+  if (gradient.data.size() != 4 * gradient.pixels()) {
+    throw UsageError(fmt::format(
+        "The gradient of a picture of {} x {} pixels has {} numbers: give {}, 4 for every pixel",
+        self.width, self.height, gradient.data.size(), 4 * gradient.pixels()));
   }
   if (!std::all_of(gradient.data.begin(), gradient.data.end(),
                    [](float value) { return std::isfinite(value); })) {
@@ -263,6 +298,7 @@ std::vector<RayResult> Tracer::trace(const Model& model,
                                      bool differentiable) {
   Impl& self = *impl_;
   const auto lock = self.context.lock();
+  self.require_idle();
   const DeviceGaussians& gaussians = gaussians_of(model, self.context);
   self.require_bare_rays();
   std::vector<Ray> sound;
@@ -298,6 +334,7 @@ void trace(Tracer& tracer,
            ColorDirection direction) {
   Tracer::Impl& self = tracer.impl();
   const auto turn = self.context.lock();
+  self.require_idle();
   const DeviceGaussians& gaussians = gaussians_of(model, self.context);
   self.require_bare_rays();
   check_foreign(self.context, rays, count * sizeof(Ray), "the rays");
@@ -317,6 +354,7 @@ void trace(Tracer& tracer,
 RaysGradients Tracer::backward(const Model& model, std::span<const RayResultGradient> gradients) {
   Impl& self = *impl_;
   const auto lock = self.context.lock();
+  self.require_idle();
   const DeviceGaussians& gaussians = gaussians_of(model, self.context);
   if (self.revision == 0 || self.revision != gaussians.revision) {
     throw UsageError(

@@ -325,7 +325,8 @@ void ViewTracer::backward(const DeviceGaussians& gaussians,
   Impl& self = *impl_;
   if (!self.kept || self.revision != gaussians.revision) {
     throw UsageError(
-        "ViewTracer::backward() must follow forward(keep = true) of the same Gaussians, unchanged");
+        "Tracer::backward() must follow render(differentiable = true) of the same model, "
+        "unchanged");
   }
   if (image_gradient.size() < 4 * pixel_count(self.camera)) {
     throw UsageError(fmt::format(

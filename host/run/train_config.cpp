@@ -127,9 +127,13 @@ std::set<std::string> read_text(const std::string& text,
                                 const std::filesystem::path& path,
                                 TrainOptions& options,
                                 const std::function<bool(const std::string&)>& skip) {
-  const toml::table root = io::parse_toml(text.starts_with(kRunMark) ? modern(text) : text, path);
+  const bool of_run = text.starts_with(kRunMark);
+  const toml::table root = io::parse_toml(of_run ? modern(text) : text, path);
   std::set<std::string> seen;
   read_keys(root, "", path, train_option_rows(options), seen, skip);
+  // Before there was the key.
+  if (of_run && !seen.contains("borders") && !skip("borders"))
+    options.data.borders = BorderUse::kKeep;
   return seen;
 }
 
@@ -213,6 +217,7 @@ void apply_run_text(CLI::App& app,
   const std::set<std::string> found = read_text(text, path, options, given);
   if (found.count("origin") == 0 && !given("origin")) options.data.origin.emplace();
   if (found.count("raise-clamped") == 0 && !given("raise-clamped")) options.raise_clamped = false;
+  if (found.count("borders") == 0 && !given("borders")) options.data.borders = BorderUse::kKeep;
   if (found.count("photo-points") == 0 && !given("photo-points")) options.photo_points = false;
   if (found.count("color-range") == 0 && !given("color-range")) options.color_range = 1;
   if (found.count("strategy") > 0) return;

@@ -194,7 +194,7 @@ void add_data_options(TrainTable& t, TrainOptions& o) {
           "(trained, by direction; model files name it)");
   t.number("sky-degree", o.sky_degree, 0, 4,
            "degree of the spherical harmonics of a sky; 0 = one trained colour");
-  t.number("image-budget", o.image_budget, 1, 1e9,
+  t.number("image-budget", o.image_budget, 0, 1e9,
            "MiB of photos and depth maps kept on the device; the others are read again when their "
            "turn comes");
   t.resolutions(
@@ -443,6 +443,8 @@ std::vector<OptionRow> train_option_rows(TrainOptions& o) {
   add_report_options(t, o);
   return t.take();
 }
+
+void check_train_options(TrainOptions options) { check_values(train_option_rows(options)); }
 
 const std::vector<RetiredKey>& retired_train_keys() {
   static const std::string fitted = "the affine colours of photos are fitted, see exposure-damping";

@@ -12,6 +12,8 @@ namespace raysplats {
 /// bound to the members of `options`, in the order of the documentation. The keys refer to
 /// `options`, which has to outlive them.
 std::vector<OptionRow> train_option_rows(TrainOptions& options);
+/// Throws UsageError for options that these keys would refuse, as programs may set them.
+void check_train_options(TrainOptions options);
 
 /// A key of earlier versions that nothing reads any more, and what there is instead.
 struct RetiredKey {

@@ -37,6 +37,15 @@ const std::string& quotable(const std::string& key, const std::string& value) {
   return value;
 }
 
+// What set() takes for the present value.
+std::vector<std::string> present_values(const OptionRow& row) {
+  const std::string text = row.text();
+  // Paths may hold what separates the items of other lists.
+  if (row.list == OptionRow::List::kPaths) return option_items(row.name, {text});
+  const bool quoted = text.size() > 1 && (text.front() == '"' || text.front() == '\'');
+  return {quoted ? text.substr(1, text.size() - 2) : text};
+}
+
 }  // namespace
 
 const OptionRow* find_row(const std::vector<OptionRow>& rows, const std::string& name) {
@@ -46,11 +55,7 @@ const OptionRow* find_row(const std::vector<OptionRow>& rows, const std::string&
 }
 
 void check_values(const std::vector<OptionRow>& rows) {
-  for (const OptionRow& row : rows) {
-    std::string text = row.text();
-    std::erase(text, '"');
-    row.set({text});
-  }
+  for (const OptionRow& row : rows) row.set(present_values(row));
 }
 
 template <class T>
@@ -175,7 +180,15 @@ void OptionTable::add_choice(const std::string& name,
         }
         store(static_cast<std::size_t>(found - labels.begin()));
       },
-      [labels, chosen] { return toml_text(labels.at(chosen())); });
+      [name, labels, chosen] {
+        const std::size_t at = chosen();
+        // As programs may set it.
+        if (at >= labels.size()) {
+          throw UsageError(fmt::format("The option '{}' is {}, not a value without a name", name,
+                                       fmt::join(labels, " or ")));
+        }
+        return toml_text(labels[at]);
+      });
 }
 
 void OptionTable::text(const std::string& name, std::string& target, const std::string& help) {

@@ -83,7 +83,9 @@ void require_pixels(const Camera& camera) {
   if (camera.width < 1 || camera.height < 1 || (focal && (!(camera.fx > 0) || !(camera.fy > 0)))) {
     throw UsageError(fmt::format("Camera '{}' has no pixels or no focal length", camera.name));
   }
+  const Distortion& d = camera.distortion;
   double sum = camera.cx + camera.cy + camera.fx + camera.fy;
+  sum += d.k1 + d.k2 + d.k3 + d.k4 + d.p1 + d.p2;
   for (int k = 0; k < 3; ++k) {
     sum += camera.translation[k];
     for (int row = 0; row < 3; ++row) sum += camera.rotation[k][row];

@@ -30,7 +30,8 @@ constexpr std::array<Level, 4> kLevels{{{4, 300, 1000, 240},
 constexpr int kFasterDevices = 2;  // times that side elsewhere
 
 constexpr double kLongestSide = 1600;
-constexpr double kSideOfSecond = 215;  // on CPUs; steps cost as pixels do
+constexpr double kSideOfSecond = 100;  // on CPUs; steps cost as pixels do
+constexpr double kLeastSide = 640;     // that a short time makes of it
 constexpr double kLeastDownscale = 1.25;
 
 // Of the usual photo to train on: a panorama among phone photos must not shrink them all.
@@ -77,7 +78,7 @@ double fitting_downscale(const Dataset& dataset, DeviceType device, std::optiona
   double side = kLongestSide;
   if (seconds) {
     const double faster = device == DeviceType::kCpu ? 1 : kFasterDevices;
-    side = std::clamp(faster * kSideOfSecond * std::sqrt(*seconds), 1.0, side);
+    side = std::clamp(faster * kSideOfSecond * std::sqrt(*seconds), kLeastSide, side);
   }
   const double factor = longest_side(dataset) / side;
   return factor >= kLeastDownscale ? factor : 1.0;

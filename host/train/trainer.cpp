@@ -12,6 +12,7 @@
 #include "run/dataset_fingerprint.hpp"
 #include "run/mirror_meshes.hpp"
 #include "run/train_config.hpp"
+#include "run/train_option_table.hpp"
 #include "train/ignored_photos.hpp"
 #include "train/memory_estimate.hpp"
 #include "train/step_options.hpp"
@@ -50,6 +51,7 @@ struct PictureBudget {
 };
 
 TrainOptions with_length(TrainOptions options, const Dataset& dataset) {
+  check_train_options(options);
   options.iterations = run_length(options, dataset.indices(Split::kTrain).size());
   validate(options);
   return options;

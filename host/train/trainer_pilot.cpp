@@ -31,6 +31,11 @@ constexpr std::int64_t kFewIterations = 500;
 constexpr double kLatestEnd = 2;         // of the iterations that were planned
 constexpr double kTellingChange = 0.03;  // of them, that users are told of
 
+void require_finite(double seconds) {
+  if (std::isfinite(seconds)) return;
+  throw UsageError(fmt::format("A time of {} s is not finite: give seconds that end", seconds));
+}
+
 class Timer {
  public:
   explicit Timer(const Context& context) : watch_(context) { watch_.start(); }
@@ -255,6 +260,7 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
 
 RunEstimate Trainer::Impl::estimate(double seconds) {
   check_not_begun("estimate");
+  require_finite(seconds);
   const Pilot pilot = run_pilot(seconds, std::nullopt);
   const std::size_t most = most_gaussians(options.iterations);
   const bool grows = density.accumulates_at(0);
@@ -267,6 +273,7 @@ RunEstimate Trainer::Impl::estimate(double seconds) {
 
 RunEstimate Trainer::Impl::fit_time(double seconds) {
   check_not_begun("fit_time");
+  require_finite(seconds);
   if (!(seconds > 0)) {
     throw UsageError(fmt::format("A run of {} s trains nothing: give it more time", seconds));
   }

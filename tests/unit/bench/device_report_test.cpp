@@ -2,6 +2,7 @@
 #include "bench/device_report.hpp"
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
 #include <chrono>
 #include <filesystem>
@@ -19,8 +20,10 @@
 #include "synth/bench_scenes.hpp"
 #include "unit/bench/report_fixture.hpp"
 #include "unit/fixture.hpp"
+#include "unit/text.hpp"
 
 using namespace raysplats;
+using test::contains;
 
 TEST_CASE("a device's report holds its self-test, every size that fits the time, and its speeds") {
   Context context(test_device(), timed_options());
@@ -99,6 +102,19 @@ TEST_CASE("a device's report is made where the self-test fails, of whatever byte
   CHECK(json.at("left_out").at(0).get<std::string>().starts_with("what a driver says: "));
 }
 
+TEST_CASE("rows that yield more than two folders of kernels are compared by are named") {
+  const std::string kernels = (std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "cl").string();
+  BenchOptions options = tiny_bench(1);
+  options.filter = "^(adam|densify|loss-gradient|loss-value|rays|view)/";
+  options.repeat = 1;
+  const KernelComparison same =
+      compare_kernels(test_device(), timed_options(), kernels, kernels, options);
+  CHECK(same.uncompared == std::vector<std::string>{"loss-value", "densify", "rays"});
+  CHECK(contains(kernel_comparison_table(same),
+                 "what these rows yield besides is not compared, but by the tests: loss-value, "
+                 "densify, rays\n"));
+}
+
 TEST_CASE("two folders of kernels are compared by what they compute, then by time in turns") {
   const TemporaryDirectory folder;
   const std::filesystem::path own = std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "cl";
@@ -114,7 +130,12 @@ TEST_CASE("two folders of kernels are compared by what they compute, then by tim
   REQUIRE(same.rows.rows.size() == 1);
   CHECK(same.rows.rows[0].before > 0);
   CHECK(same.rows.rows[0].spread > 0);
-  CHECK(kernel_comparison_table(same).find("equal to the last bit") != std::string::npos);
+  CHECK(same.uncompared.empty());
+  const std::string table = kernel_comparison_table(same);
+  CHECK(contains(table, fmt::format("the {} pictures, gradients and parameters after a step are "
+                                    "equal to the last bit\n",
+                                    same.results.size())));
+  CHECK(!contains(table, "not compared"));
 
   // A step of Adam that goes further.
   const std::filesystem::path adam = changed / "train" / "adam.cl";

@@ -98,6 +98,23 @@ TEST_CASE("kernel: a compile error shows file, line and the compiler's message")
   CHECK(contains(message, "broken.cl:3"));
   CHECK(contains(message, "undeclared_name"));
   CHECK(contains(message, context.device().name));
+  // The file is the user's own.
+  CHECK(contains(message, "Kernel file " + (folder.path() / "broken.cl").string() + " does not"));
+  CHECK(contains(message, "): correct it\n"));
+}
+
+TEST_CASE("kernel: a compile error of a folder that the context names has the file's path") {
+  const TemporaryDirectory folder;
+  folder.write("broken.cl", "__kernel void f(__global int* a) { a[0] = undeclared_name; }\n");
+  ContextOptions options = uncached();
+  options.kernel_directory = folder.path().string();
+  Context context(test_device(), options);
+  const std::string message =
+      message_of<DeviceError>([&] { context.kernel("broken.cl", "f").argument_count(); });
+  CAPTURE(message);
+  CHECK(contains(message, (folder.path() / "broken.cl").string()));
+  CHECK(contains(message, "correct it"));
+  CHECK(!contains(message, "update the driver"));
 }
 
 TEST_CASE("kernel: launches with defines, values and rounded ranges") {

@@ -11,6 +11,7 @@
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
 #include "unit/io/data_sets.hpp"
+#include "util/srgb.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -19,6 +20,7 @@ namespace {
 
 constexpr int kPhotos = 12;
 constexpr int kWidth = 64, kHeight = 48;
+constexpr const char* kFisheye = R"("camera_model": "OPENCV_FISHEYE", "fl_x": 16, "fl_y": 16)";
 
 // Whether a photo is black there.
 using Black = std::function<bool(int photo, int x, int y)>;
@@ -135,7 +137,7 @@ TEST_CASE("borders may lie on all sides, bend, or surround the circle of a fishe
   // As photos are whose lens was taken out by another program.
   const auto bent = [](int, int x, int y) {
     const double u = (x + 0.5) / (kWidth / 2) - 1, v = (y + 0.5) / (kHeight / 2) - 1;
-    const double stretch = 1 + 0.15 * (u * u + v * v);
+    const double stretch = 1 + 0.08 * (u * u + v * v);
     return std::abs(u * stretch) > 1.02 || std::abs(v * stretch) > 1.02;
   };
   for (const Black& black : {Black(window), Black(pillars), Black(bent)}) {
@@ -149,8 +151,7 @@ TEST_CASE("borders may lie on all sides, bend, or surround the circle of a fishe
     return std::hypot(x + 0.5 - kWidth / 2, y + 0.5 - kHeight / 2) > kHeight / 2;
   };
   const Scratch scratch;
-  write_photos(scratch, circle,
-               {.camera = "\"camera_model\": \"OPENCV_FISHEYE\", \"fl_x\": 16, \"fl_y\": 16"});
+  write_photos(scratch, circle, {.camera = kFisheye});
   const Wrong found = wrong(scratch, circle);
   CHECK(found.left < 0.02);
   CHECK(found.hidden < 0.08);
@@ -179,17 +180,84 @@ TEST_CASE("what is black without being a border counts") {
     const double u = (x + 0.5 - 32) / 22;
     return std::abs(u) > 1 || std::abs(y + 0.5 - 24) > 15 + 5 * std::sqrt(1 - u * u);
   };
+  // A pillar that leaves the photo above and below, seen from above.
+  const auto standing_pillar = [](int, int x, int y) {
+    return std::abs(x + 0.5 - 32) > 21 - 0.06 * y;
+  };
   const auto night_sky = [](int photo, int, int y) { return y < 8 + 5 * (photo % 5); };
   const auto hill_at_night = [](int, int x, int y) { return y < 4 + x / 2; };
   const auto one_row = [](int, int, int y) { return y < 1; };
   const auto nothing = [](int, int, int) { return false; };
   const auto everything = [](int, int, int) { return true; };
-  for (const Black& black : {Black(moving_body), Black(standing_body), Black(standing_ball),
-                             Black(standing_can), Black(night_sky), Black(hill_at_night),
-                             Black(one_row), Black(nothing), Black(everything)}) {
+  for (const Black& black :
+       {Black(moving_body), Black(standing_body), Black(standing_ball), Black(standing_can),
+        Black(standing_pillar), Black(night_sky), Black(hill_at_night), Black(one_row),
+        Black(nothing), Black(everything)}) {
     const Scratch scratch;
     write_photos(scratch, black);
     CHECK_FALSE(has_borders(scratch));
+  }
+}
+
+TEST_CASE("a fisheye has the border of a circle, and none around a body") {
+  const auto egg = [](int, int x, int y) {
+    return std::hypot((x + 0.5 - 32) / 26, (y + 0.5 - 24) / 18) > 1;
+  };
+  const auto column = [](int, int x, int y) {
+    return std::abs(x + 0.5 - 30) > 12 + 0.1 * y || y < 5 + (x - 30) * (x - 30) / 40;
+  };
+  for (const Black& black : {Black(egg), Black(column)}) {
+    const Scratch scratch;
+    write_photos(scratch, black, {.camera = kFisheye});
+    CHECK_FALSE(has_borders(scratch));
+  }
+  const auto cut_circle = [](int, int x, int y) {
+    return std::hypot(x + 0.5 - kWidth / 2, y + 0.5 - kHeight / 2) > 28;
+  };
+  const Scratch scratch;
+  write_photos(scratch, cut_circle, {.camera = kFisheye});
+  CHECK(wrong(scratch, cut_circle).left < 0.02);
+}
+
+TEST_CASE("a photo that shows something where the others have a border has none") {
+  constexpr int kMany = 40;
+  const Scratch scratch;
+  const auto other_clip = [](int photo, int x, int y) {
+    return photo % 10 != 9 && bars(photo, x, y);
+  };
+  write_photos(scratch, other_clip, {.count = kMany});
+  const Dataset dataset = load_dataset(scratch.path());
+  for (const int photo : {1, 9, 19, 20, 39}) {
+    CAPTURE(photo);
+    const auto view = std::find_if(dataset.views.begin(), dataset.views.end(), [&](const View& v) {
+      return v.camera.name == "photo_" + std::to_string(10 + photo) + ".png";
+    });
+    REQUIRE(view != dataset.views.end());
+    REQUIRE(view->border);
+    CHECK(load_view_image(*view).at(30, 2, 3) == (photo % 10 == 9 ? 1.0f : 0.0f));
+  }
+}
+
+TEST_CASE("black is as dark in photos of light as in others [small]") {
+  // Of 255 as it is shown.
+  for (const float level : {20.0f, 40.0f}) {
+    const Scratch scratch;
+    std::string frames;
+    for (int photo = 0; photo < kPhotos; ++photo) {
+      Image image(kWidth, kHeight, 3, light_from_display(level / 255.0f));
+      for (int y = 10; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth; ++x) {
+          for (int c = 0; c < 3; ++c) image.at(x, y, c) = scenery(photo, x, y);
+        }
+      }
+      const std::string name = "photo_" + std::to_string(10 + photo) + ".exr";
+      write_image(scratch / name, image);
+      frames += std::string(photo > 0 ? ", " : "") + "{\"file_path\": \"" + name +
+                "\", \"transform_matrix\": " + matrix_json(photo) + "}";
+    }
+    write_bytes(scratch / "transforms.json",
+                "{\"camera_angle_x\": 0.8, \"frames\": [" + frames + "]}");
+    CHECK(has_borders(scratch) == (level < 24.0f));
   }
 }
 

@@ -356,6 +356,38 @@ TEST_CASE("what a watch throws comes out, and leaves the tracer without a pictur
   }
 }
 
+TEST_CASE("a tracer refuses to work for what watches it [small]") {
+  Context context = make_test_context();
+  const Model model(context, reference::random_scene(60, 43, 0));
+  const Camera camera = reference::cube_camera(24, 18);
+  const std::vector<Ray> rays = random_rays(5, 38, 2.0, 0.5, kInfinity);
+  for (const Traversal traversal : {Traversal::kTiles, Traversal::kBvh}) {
+    TraceOptions options;
+    options.traversal = traversal;
+    Tracer tracer(context, options), other(context, options);
+    const Image expected = tracer.render(model, camera);
+    int calls = 0;
+    const auto watch = [&](double) {
+      ++calls;
+      CHECK(message_of<UsageError>([&] { tracer.render(model, camera); }).find("is rendering") !=
+            std::string::npos);
+      CHECK_THROWS_AS(tracer.normals(model, camera), UsageError);
+      CHECK_THROWS_AS(tracer.trace(model, rays), UsageError);
+      CHECK_THROWS_AS(tracer.backward(model, Image(24, 18, 4)), UsageError);
+      CHECK_THROWS_AS(tracer.backward(model, std::vector<RayResultGradient>(5)), UsageError);
+      CHECK(other.render(model, camera).data == expected.data);
+      return true;
+    };
+    CHECK(tracer.render(model, camera, true, watch).data == expected.data);
+    CHECK(calls > 0);
+    CHECK_NOTHROW(tracer.backward(model, Image(24, 18, 4)));
+    calls = 0;
+    CHECK_FALSE(tracer.normals(model, camera, watch).data.empty());
+    CHECK(calls > 0);
+    CHECK(tracer.trace(model, rays).size() == rays.size());
+  }
+}
+
 TEST_CASE("models and tracers refuse what cannot be traced") {
   Context context = make_test_context();
   Gaussians gaussians = reference::random_scene(20, 39, 1);
@@ -391,6 +423,10 @@ TEST_CASE("models and tracers refuse what cannot be traced") {
   CHECK(refused(bad).find("length 0") != std::string::npos);
   bad.direction[0] = kInfinity;
   CHECK(refused(bad).find("not finite") != std::string::npos);
+  bad.direction[0] = 2e19f;
+  CHECK(refused(bad).find("beyond 1e19") != std::string::npos);
+  bad.direction[0] = 9e18f;
+  CHECK(refused(bad).empty());
   bad = good;
   bad.t_min = 2;
   bad.t_max = 1;
@@ -418,11 +454,18 @@ TEST_CASE("models and tracers refuse what cannot be traced") {
 
   Camera camera = reference::cube_camera(8, 6);
   CHECK_THROWS_AS(tracer.depth(), UsageError);
-  CHECK_THROWS_AS(tracer.backward(model, Image(8, 6, 4)), UsageError);
+  const auto refused_gradient = [&](const Image& gradient) {
+    return message_of<UsageError>([&] { tracer.backward(model, gradient); });
+  };
+  CHECK(refused_gradient(Image(8, 6, 4)).find("There is no picture yet") != std::string::npos);
   tracer.render(model, camera);
   CHECK_THROWS_AS(tracer.depth(), UsageError);
-  CHECK_THROWS_AS(tracer.backward(model, Image(8, 6, 4)), UsageError);
+  CHECK(refused_gradient(Image(8, 6, 4))
+            .find("Tracer::backward() must follow render(differentiable = true)") == 0);
   tracer.render(model, camera, true);
+  Image brief(8, 6, 4);
+  brief.data.pop_back();
+  CHECK(refused_gradient(brief).find("has 191 numbers: give 192") != std::string::npos);
   CHECK_THROWS_AS(tracer.backward(model, Image(8, 6, 3)), UsageError);
   CHECK_THROWS_AS(tracer.backward(model, Image(6, 8, 4)), UsageError);
   CHECK_THROWS_AS(tracer.backward(model, Image(8, 6, 4, kNan)), UsageError);

@@ -270,6 +270,18 @@ TEST_CASE("the configurations of runs of older versions are read") {
   std::filesystem::remove(path);
 }
 
+TEST_CASE("a run that is older than the key for borders keeps them") {
+  const TemporaryDirectory folder;
+  const std::filesystem::path path = folder.path() / "config.toml";
+  for (const bool of_run : {true, false}) {
+    folder.write("config.toml",
+                 std::string(of_run ? "# ---- Run ----\n" : "") + "iterations = 5\n");
+    TrainOptions options;
+    read_train_config(path, options);
+    CHECK(options.data.borders == (of_run ? BorderUse::kKeep : BorderUse::kAuto));
+  }
+}
+
 TEST_CASE("limits of scales that nothing can keep are refused") {
   const auto path = temporary("scales.toml");
   write_text_file(path, "scale-min = 0.2\nscale-max = 0.1\n");
@@ -355,6 +367,7 @@ TEST_CASE("a resumed run that is older than a key goes on as it began") {
   const TrainOptions old = options_of("resolution-schedule = [300, 1000]\nsave-at = [7000]\n", {});
   CHECK(old.strategy == DensityStrategy::kAdc);
   CHECK(old.footprint == 0.0);
+  CHECK(old.data.borders == BorderUse::kKeep);
   CHECK(old.resolution_schedule == std::vector<ResolutionStep>{{4, 300}, {2, 1000}});
   const TrainOptions asked = options_of("save-at = [7000]\n", {"--strategy", "budget"});
   CHECK(asked.strategy == DensityStrategy::kBudget);

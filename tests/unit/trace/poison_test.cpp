@@ -252,6 +252,19 @@ TEST_CASE("poison: any number in a camera makes a clean picture or an error") {
       }
     }
   }
+  for (const CameraModel lens : {CameraModel::kOpenCv, CameraModel::kFisheye}) {
+    for (double Distortion::*number : {&Distortion::k1, &Distortion::k2, &Distortion::k3,
+                                       &Distortion::k4, &Distortion::p1, &Distortion::p2}) {
+      for (const float value : kPoison) {
+        if (std::isfinite(value)) continue;
+        CAPTURE(value);
+        Camera camera = sound;
+        camera.model = lens;
+        camera.distortion.*number = static_cast<double>(value);
+        CHECK_THROWS_AS(tracer.forward(gaussians, camera), UsageError);
+      }
+    }
+  }
   for (const int side : {std::numeric_limits<int>::min(), -1, 0, std::numeric_limits<int>::max()}) {
     CAPTURE(side);
     Camera camera = sound;

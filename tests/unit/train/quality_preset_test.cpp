@@ -57,13 +57,14 @@ TEST_CASE("large photos are reduced to a size that trainers expect, or that a ti
   CHECK(factor() == 2.5);
   CHECK(factor(std::nullopt, DeviceType::kGpu) == 2.5);
   CHECK(factor(3600.0) == 2.5);
-  CHECK(factor(25.0) == doctest::Approx(4000.0 / 1075));
-  CHECK(factor(25.0, DeviceType::kGpu) == 2.5);
+  CHECK(factor(100.0) == 4.0);
+  CHECK(factor(100.0, DeviceType::kGpu) == 2.5);
+  CHECK(factor(5.0) == 6.25);
   // One large photo among small ones says nothing of them, and a little is not worth blurring.
   sized(1920, 1080);
   dataset.views[4].camera.width = 8000;
   CHECK(factor() == 1.0);
   sized(480, 270);
   CHECK(factor(5.0) == 1.0);
-  CHECK(factor(1.0) == doctest::Approx(480.0 / 215));
+  CHECK(factor(1.0) == 1.0);
 }

@@ -2,6 +2,7 @@
 // Trainer::estimate() and Trainer::fit_time().
 #include <doctest/doctest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <string>
 
@@ -84,6 +85,10 @@ TEST_CASE("a run by time names its length, and a replay of its configuration giv
   options.trace.deterministic = true;
   Trainer trainer(shared_test_context(), load_dataset(data), options, run);
   CHECK_THROWS_AS(trainer.fit_time(0), UsageError);
+  for (const double endless : {HUGE_VAL, std::nan("")}) {
+    CHECK_THROWS_AS(trainer.fit_time(endless), UsageError);
+    CHECK_THROWS_AS(trainer.estimate(endless), UsageError);
+  }
   CHECK_THROWS_AS(trainer.fit_time(1e-4), UsageError);
   const RunEstimate estimate = trainer.fit_time(4);
   CHECK(estimate.seconds <= 4.0);
