@@ -74,6 +74,7 @@ std::vector<Camera> cameras_of(const Options& options,
                                   {source.origin[0], source.origin[1], source.origin[2]});
   }
   if (options.data.data.empty()) return trained_cameras(source);
+  cameras.reserve(views.size());
   for (const View& each : views) cameras.push_back(each.camera);
   return cameras;
 }

@@ -33,13 +33,6 @@ std::string first_bytes(const std::filesystem::path& path) {
   return std::string(bytes.data(), static_cast<std::size_t>(stream.gcount()));
 }
 
-/// What is read of a model: of the folder of an unpacked SOG its meta.json, else the path itself.
-std::filesystem::path file_of(const std::filesystem::path& path) {
-  const std::filesystem::path meta = path / kSogMeta;
-  std::error_code error;
-  return std::filesystem::is_regular_file(meta, error) ? meta : path;
-}
-
 /// What of a model lies beyond what SPZ has codes for, and is cut.
 std::string spz_clamped(const Gaussians& model) {
   const std::size_t stride = 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree));
@@ -75,6 +68,12 @@ std::string spz_losses(const Gaussians& model) {
 }
 
 }  // namespace
+
+std::filesystem::path file_of(const std::filesystem::path& path) {
+  const std::filesystem::path meta = path / kSogMeta;
+  std::error_code error;
+  return std::filesystem::is_regular_file(meta, error) ? meta : path;
+}
 
 ModelFormat model_format(const std::filesystem::path& path) {
   const std::string start = first_bytes(path);

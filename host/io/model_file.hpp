@@ -13,6 +13,9 @@ namespace raysplats::io {
 /// A compressed PLY is read as kPly, which its first bytes say.
 enum class ModelFormat { kPly, kCompressedPly, kSplat, kSpz, kSog, kGltf, kUnknown };
 
+/// What is read of a model: of the folder of an unpacked SOG its meta.json, else the path itself.
+std::filesystem::path file_of(const std::filesystem::path& path);
+
 /// What a file is, by its first bytes, else by its extension.
 ModelFormat model_format(const std::filesystem::path& path);
 

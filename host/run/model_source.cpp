@@ -24,7 +24,6 @@ namespace raysplats {
 namespace {
 
 constexpr std::string_view kIterationPrefix = "iteration_";
-constexpr const char* kSogMeta = "meta.json";  // of one that is unpacked
 
 std::optional<std::int64_t> iteration_of(const std::filesystem::path& folder) {
   const std::string name = folder.filename().string();
@@ -35,10 +34,7 @@ std::optional<std::int64_t> iteration_of(const std::filesystem::path& folder) {
   return error == std::errc() && next == end && value >= 0 ? std::optional(value) : std::nullopt;
 }
 
-bool holds_sog(const std::filesystem::path& folder) {
-  std::error_code error;
-  return std::filesystem::is_regular_file(folder / kSogMeta, error);
-}
+bool holds_sog(const std::filesystem::path& folder) { return io::file_of(folder) != folder; }
 
 std::filesystem::path config_of(const std::filesystem::path& run) { return run / "config.toml"; }
 
@@ -164,7 +160,7 @@ ModelSource find_model(const std::filesystem::path& path) {
     return source;
   }
   if (holds_sog(path) && !is_run_folder(path)) {
-    source.file = path / kSogMeta;
+    source.file = io::file_of(path);
     return source;
   }
   for (std::filesystem::directory_iterator entry(path / "point_cloud", error), end;

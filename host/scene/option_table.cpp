@@ -165,7 +165,7 @@ void OptionTable::flag(const std::string& name, bool& target, const std::string&
 }
 
 void OptionTable::add_choice(const std::string& name,
-                             std::vector<std::string> labels,
+                             const std::vector<std::string>& labels,
                              const std::string& help,
                              const std::function<void(std::size_t)>& store,
                              const std::function<std::size_t()>& chosen) {
@@ -248,6 +248,7 @@ void OptionTable::paths(const std::string& name,
       },
       [&target] {
         std::vector<std::string> texts;
+        texts.reserve(target.size());
         for (const std::string& path : target) texts.push_back(toml_text(path));
         return fmt::format("[{}]", fmt::join(texts, ", "));
       },

@@ -87,7 +87,7 @@ class OptionTable {
 
  private:
   void add_choice(const std::string& name,
-                  std::vector<std::string> labels,
+                  const std::vector<std::string>& labels,
                   const std::string& help,
                   const std::function<void(std::size_t)>& store,
                   const std::function<std::size_t()>& chosen);
@@ -105,7 +105,7 @@ void OptionTable::choice(const std::string& name,
   labels.reserve(names.size());
   for (const auto& each : names) labels.push_back(each.first);
   add_choice(
-      name, std::move(labels), help,
+      name, labels, help,
       [&target, names](std::size_t chosen) { target = names.at(chosen).second; },
       [&target, names] {
         std::size_t i = 0;
