@@ -10,6 +10,7 @@
 #include <glm/matrix.hpp>
 #include <glm/vec2.hpp>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
@@ -80,7 +81,8 @@ class DarkPixels {
         channels_(static_cast<std::size_t>(photo.channels)),
         colors_(channels_ < 3 ? 1 : 3) {
     if (light) black_ = light_from_display(black_);
-    if constexpr (std::is_integral_v<T>) black_ *= static_cast<double>(static_cast<T>(-1));
+    if constexpr (std::is_integral_v<T>)
+      black_ *= static_cast<double>(std::numeric_limits<T>::max());
   }
   bool dark(int x, int y) const {
     const std::size_t pixel = static_cast<std::size_t>(y) * width_ + static_cast<std::size_t>(x);

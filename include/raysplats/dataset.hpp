@@ -121,8 +121,9 @@ struct DatasetOptions {
 /// Detects the kind of data set (COLMAP, nerfstudio, Blender, LLFF, Polycam) and reads everything
 /// but the pixels. A transforms file is read itself, whatever lies beside it; those of Blender
 /// stand for their folder. Poses whose photos are missing are left out with a warning where most
-/// are there. Throws DataError for a folder that is none, missing images, an unsupported camera
-/// model, no views, a mask of another shape than its photo.
+/// are there, and training views of photos that are held out too where these are few. Throws
+/// DataError for a folder that is none, missing images, an unsupported camera model, no views, a
+/// mask of another shape than its photo.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options = {});
 
 /// The photo of a view as RGBA float at camera.width x camera.height: undistorted where

@@ -9,7 +9,7 @@ namespace raysplats {
 struct Ray {
   float origin[3];     ///< world units
   float t_min;         ///< at least 0
-  float direction[3];  ///< of any length but 0
+  float direction[3];  ///< of a length above 0, at most 1e19
   float t_max;         ///< at least t_min; infinity: without end
 };
 

@@ -57,9 +57,10 @@ class Tracer {
   /// RGBA at the camera's size: background blended in, A = 1 - transmittance. `differentiable`
   /// keeps what backward() needs, within options.memory_budget. `within` hears the share of the
   /// picture that is done, several times a second, and returns false to stop; then the picture is
-  /// empty. Throws UsageError for a camera without pixels, with a number that is not finite or with
-  /// a rotation that scales, shears or mirrors by more than 1e-3, for a model of another context,
-  /// and for a camera that Traversal::kTiles cannot trace.
+  /// empty. It may use other tracers, not this one. Throws UsageError for a camera without pixels,
+  /// with a number that is not finite or with a rotation that scales, shears or mirrors by more
+  /// than 1e-3, for a model of another context, and for a camera that Traversal::kTiles cannot
+  /// trace.
   Image render(const Model& model,
                const Camera& camera,
                bool differentiable = false,
