@@ -221,9 +221,10 @@ RS_GROUP_INLINE bool group_in_passes(__local ForwardMemory* memory,
     if (reads) bound = group_bound(memory, candidates, batch, scene);
     candidates->taken += batch;
     reads = !group_blend_lists(memory, bound, scene, &list, p, stream);
-    // What lies behind a hit that was lost is not for this pass.
-    const bool searches =
-        list.alive && bound < INFINITY && !(list.lost.key < bound && list.count == 0);
+    // What lies behind a hit that was lost is not for this pass. (Without branches: by those LLVM
+    // 18 gives up within PoCL 6, "Instruction Combining did not reach a fixpoint".)
+    const bool waits = (list.lost.key < bound) & (list.count == 0);
+    const bool searches = (list.alive != 0) & (bound < INFINITY) & !waits;
     const uint then = list.alive && list.lost.key < INFINITY ? RS_RESUME(list.resume) : RS_NOTHING;
     next = group_least(memory, lane, !reads || searches ? RS_READ_ON : then);
   }

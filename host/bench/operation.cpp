@@ -42,6 +42,16 @@ double run_once(Context& context, const BenchOperation& operation, std::vector<d
   return wall;
 }
 
+// Google Benchmark says it by another member since 1.8.
+template <class Run>
+bool was_skipped(const Run& run) {
+  if constexpr (requires { run.error_occurred; }) {
+    return run.error_occurred;
+  } else {
+    return static_cast<bool>(run.skipped);
+  }
+}
+
 // Keeps the samples and prints nothing: the report is made later and elsewhere.
 class Collector : public benchmark::BenchmarkReporter {
  public:
@@ -52,7 +62,7 @@ class Collector : public benchmark::BenchmarkReporter {
   bool ReportContext(const Context&) override { return true; }
   void ReportRuns(const std::vector<Run>& runs) override {
     for (const Run& run : runs) {
-      if (run.run_type != Run::RT_Iteration || run.error_occurred) continue;
+      if (run.run_type != Run::RT_Iteration || was_skipped(run)) continue;
       std::vector<StageSamples>& stages = samples.at(std::stoul(run.run_name.function_name));
       for (std::size_t i = 0; i < stages.size(); ++i) {
         stages[i].seconds.push_back(run.counters.at(counter_name(i)).value);

@@ -33,8 +33,9 @@ std::size_t Kernel::subgroups(std::size_t items) const {
   impl_->make();
   // Devices of OpenCL 2.0 know it as an extension alone, others need not have that.
   const cl::Device& device = impl_->context->device;
-  void* found = clGetExtensionFunctionAddressForPlatform(device.getInfo<CL_DEVICE_PLATFORM>(),
-                                                         "clGetKernelSubGroupInfoKHR");
+  // What getInfo() gives is a cl::Platform or a bare cl_platform_id, by the headers' age.
+  const cl::Platform platform(device.getInfo<CL_DEVICE_PLATFORM>());
+  void* found = clGetExtensionFunctionAddressForPlatform(platform(), "clGetKernelSubGroupInfoKHR");
   const auto ask = found != nullptr ? reinterpret_cast<decltype(&clGetKernelSubGroupInfo)>(found)
                                     : &clGetKernelSubGroupInfo;
   std::size_t number = 0;

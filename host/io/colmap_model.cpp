@@ -64,7 +64,7 @@ constexpr std::uint64_t kMaxCameraSide = 1u << 20;
 using Fail = std::function<void(const std::string&)>;
 
 /// The model or an error that names it.
-const ModelType& checked_model(const ModelType* model, const std::string& name, const Fail& fail) {
+const ModelType& checked_model(const ModelType* model, std::string_view name, const Fail& fail) {
   if (model == nullptr) {
     fail(fmt::format(
         "the camera model {} is not known, undistort the images to PINHOLE first: found", name));

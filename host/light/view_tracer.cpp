@@ -113,8 +113,11 @@ struct ViewTracer::Impl {
     if (!light.empty() && !mirrors.meshes.empty()) require_no_sky();
     if (sky || !light.empty()) kept = false;
     background = light.empty() ? color : std::array<float, 3>{};
-    sky.reset();
-    if (!light.empty()) sky.emplace(context, light);
+    if (light.empty()) {
+      sky.reset();
+    } else {
+      sky.emplace(context, light);
+    }
   }
   Rays& single_rays() {
     if (!rays) rays.emplace(context, options, mirrors);

@@ -93,7 +93,7 @@ template std::uint64_t option_number<std::uint64_t>(const std::string&,
 template float option_number<float>(const std::string&, const std::string&, double, double);
 template double option_number<double>(const std::string&, const std::string&, double, double);
 
-const std::string& option_value(const std::string& key, const std::vector<std::string>& values) {
+const std::string& option_value(std::string_view key, const std::vector<std::string>& values) {
   if (values.size() != 1) {
     throw UsageError(fmt::format("The option '{}' takes one value, not {}", key, values.size()));
   }

@@ -4,6 +4,7 @@
 #include <array>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -40,7 +41,7 @@ constexpr double kMaxSeed = 0x1p64;
 template <class T>
 T option_number(const std::string& key, const std::string& text, double low, double high);
 /// The only value. Throws UsageError for none or several.
-const std::string& option_value(const std::string& key, const std::vector<std::string>& values);
+const std::string& option_value(std::string_view key, const std::vector<std::string>& values);
 /// The items of a list in any spelling. Throws UsageError for what is none.
 std::vector<std::string> option_items(const std::string& key,
                                       const std::vector<std::string>& values);
