@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <filesystem>
 #include <glm/geometric.hpp>
 #include <glm/mat2x2.hpp>
 #include <glm/matrix.hpp>
@@ -19,6 +20,7 @@
 #include <utility>
 #include <variant>
 
+#include "io/body_outline.hpp"
 #include "io/image_codec.hpp"
 #include "io/photo_orientation.hpp"
 #include "raysplats/error.hpp"
@@ -37,8 +39,8 @@ constexpr double kBlack = 24.0 / 255.0;
 constexpr int kLeastDepth = 2;
 // Of the columns or rows that show something, those that a side's border has to cover.
 constexpr double kLeastCover = 0.25;
-// Of all columns or rows, those that show something: bodies before a black ground are narrower.
-constexpr double kLeastShown = 0.5;
+// Of all columns or rows, those that show something: a vertical video between bars has a third.
+constexpr double kLeastShown = 0.25;
 // A side is straight but for a twelfth at either end, or bent and narrow, as edges are whose lens
 // was taken out; as shares of the photo's size. Bodies that turn have bent or slanted sides.
 constexpr double kMostBend = 0.005;
@@ -51,8 +53,15 @@ constexpr double kLeastAgreement = 0.6;
 constexpr double kMostOffCircle = 0.02;
 constexpr double kLeastRadius = 0.4;
 constexpr double kLeastOnCircle = 0.8;
-// Of a photo: a vertical video between bars has less.
-constexpr double kMostHidden = 0.75;
+// The outline of a body, as a share of its radius: those of turntables miss it by less than 0.04,
+// borders of captures by hand that look around by more than 0.07. And how many points of an edge
+// tell.
+constexpr double kLeastMisfit = 0.05;
+constexpr std::size_t kEdgePoints = 16;
+// Folders that photos are told apart by, as several clips lie in.
+constexpr std::size_t kMostFolders = 8;
+// Of a photo: a vertical video with bars on all sides has less.
+constexpr double kMostHidden = 0.85;
 // Of what a border hides of a photo: one that shows more there has none.
 constexpr double kMostShown = 0.1;
 
@@ -234,23 +243,76 @@ Circle fitted_circle(std::span<const glm::dvec2> points) {
   return {mean + center, std::sqrt(glm::dot(center, center) + size)};
 }
 
-// Whether what is black lies around the circle of a fisheye, which a photo may cut.
-bool is_circle(const Edges& edges) {
+// The circle that something is shown in, as that of a fisheye, which a photo may cut.
+std::optional<Circle> circle_of(const Edges& edges) {
   std::vector<glm::dvec2> ends = ends_of(edges);
   const double side = std::min(edges.width, edges.height);
-  if (static_cast<double>(ends.size()) < kLeastCover * side) return false;
+  if (static_cast<double>(ends.size()) < kLeastCover * side) return std::nullopt;
   const std::size_t all = ends.size();
   Circle circle = fitted_circle(ends);
   // Once more without what is dark beside it.
   std::erase_if(ends,
                 [&](const glm::dvec2& p) { return circle.off(p) > 2 * kMostOffCircle * side; });
-  if (ends.size() < 3) return false;
+  if (ends.size() < 3) return std::nullopt;
   circle = fitted_circle(ends);
   const auto on = std::count_if(ends.begin(), ends.end(), [&](const glm::dvec2& p) {
     return circle.off(p) <= kMostOffCircle * side;
   });
-  return circle.radius >= kLeastRadius * side &&
-         static_cast<double>(on) >= kLeastOnCircle * static_cast<double>(all);
+  const double most = std::hypot(edges.width, edges.height);  // larger ones are straight edges
+  const bool found = circle.radius >= kLeastRadius * side && circle.radius <= most &&
+                     static_cast<double>(on) >= kLeastOnCircle * static_cast<double>(all);
+  return found ? std::optional(circle) : std::nullopt;
+}
+
+// Whether the circle is that of the lens. Where all cameras see the outline of one ball in it, it
+// may be that of a body; fisheyes that look to one side alone are believed.
+bool is_of_lens(const Circle& circle, const Edges& edges, std::span<const Camera> cameras) {
+  const std::vector<glm::dvec2> ends = ends_of(edges);
+  std::vector<EdgePoint> points;
+  for (const std::size_t i : even_choice(ends.size(), kEdgePoints))
+    points.push_back({ends[i], glm::normalize(circle.center - ends[i])});
+  if (outline_misfit(cameras, points, RoundBody::kBall) >= kLeastMisfit) return true;
+  return is_fisheye(cameras.front()) && !look_around(cameras);
+}
+
+// Points of a side's straight edge, without its ends where these bend.
+std::vector<EdgePoint> straight_edge(const Edges& edges, Side side) {
+  const std::vector<int>& depths = edges.depths[side];
+  const int most = edges.depth_of(side);
+  std::vector<int> shown = partly(depths, most);
+  if (shown.empty()) return {};
+  const auto middle = shown.begin() + static_cast<std::ptrdiff_t>(shown.size() / 2);
+  std::nth_element(shown.begin(), middle, shown.end());
+  std::vector<std::size_t> places;
+  for (std::size_t i = 0; i < depths.size(); ++i) {
+    const bool straight = std::abs(depths[i] - *middle) <= 1 + kMostBend * most;
+    if (straight && depths[i] >= kLeastDepth && depths[i] < most) places.push_back(i);
+  }
+  std::vector<EdgePoint> out;
+  for (const std::size_t i : even_choice(places.size(), kEdgePoints)) {
+    const double along = static_cast<double>(places[i]) + 0.5;
+    const double depth = depths[places[i]];
+    const double inward = side == kTop || side == kLeft ? 1.0 : -1.0;
+    const double across = inward > 0 ? depth : most - depth;
+    if (side == kTop || side == kBottom) {
+      out.push_back({{along, across}, {0.0, inward}});
+    } else {
+      out.push_back({{across, along}, {inward, 0.0}});
+    }
+  }
+  return out;
+}
+
+// Whether edges on opposite sides are, for all cameras, the outline of one upright body, as of one
+// that turns before a black ground.
+bool is_body(const Edges& edges, std::span<const Camera> cameras) {
+  const auto outlines = [&](Side one, Side other) {
+    std::vector<EdgePoint> points = straight_edge(edges, one);
+    const std::vector<EdgePoint> more = straight_edge(edges, other);
+    points.insert(points.end(), more.begin(), more.end());
+    return outline_misfit(cameras, points, RoundBody::kCylinder) < kLeastMisfit;
+  };
+  return look_around(cameras) && (outlines(kLeft, kRight) || outlines(kTop, kBottom));
 }
 
 bool is_full(const std::vector<int>& depths, int most) {
@@ -258,20 +320,26 @@ bool is_full(const std::vector<int>& depths, int most) {
 }
 
 // What hides the border that photos agree about; empty where a side has none.
-std::array<std::vector<int>, kSides> hidden_depths(std::span<const Edges> photos, bool fisheye) {
+std::array<std::vector<int>, kSides> hidden_depths(std::span<const Edges> photos,
+                                                   std::span<const Camera> cameras) {
   Edges common{photos.front().width, photos.front().height, {}};
   for (const Side side : {kTop, kBottom, kLeft, kRight})
     common.depths[side] = common_depths(photos, side);
-  const bool circle = fisheye && is_circle(common);
+  const std::optional<Circle> round = circle_of(common);
+  const bool circle = round && is_of_lens(*round, common, cameras);
   for (const Side side : {kTop, kBottom, kLeft, kRight}) {
     std::vector<int>& depths = common.depths[side];
     const int most = common.depth_of(side);
     const bool border = is_covered(depths, most) && (circle || is_straight(depths, most)) &&
                         is_agreed(depths, photos, side, most);
     if (!border) depths.clear();
+  }
+  if (!circle && is_body(common, cameras)) return {};
+  for (const Side side : {kTop, kBottom, kLeft, kRight}) {
+    const int most = common.depth_of(side);
     // Pictures are blurred where a border ends, and dark at the rim of a circle.
     const int margin = 1 + most / (circle ? 200 : 1000);
-    for (int& depth : depths) {
+    for (int& depth : common.depths[side]) {
       if (depth >= kLeastDepth) depth = std::min(depth + margin, most);
     }
   }
@@ -282,13 +350,16 @@ std::shared_ptr<const PhotoBorder> common_border(std::span<const View* const> ph
   std::vector<const View*> chosen;
   for (const std::size_t i : even_choice(photos.size(), kMostPhotos)) chosen.push_back(photos[i]);
   std::vector<Edges> edges;
-  const auto tells = [](const std::optional<Edges>& found) { return found && !found->is_black(); };
+  std::vector<Camera> cameras;
+  const auto take = [&](std::optional<Edges> found, const View& view) {
+    if (!found || found->is_black()) return;
+    edges.push_back(std::move(*found));
+    cameras.push_back(view.source_camera);
+  };
   // Most captures have no border, which their first photo shows.
   std::size_t first = 0;
-  for (; first < chosen.size() && edges.empty(); ++first) {
-    if (std::optional<Edges> found = edges_of(*chosen[first]); tells(found))
-      edges.push_back(std::move(*found));
-  }
+  for (; first < chosen.size() && edges.empty(); ++first)
+    take(edges_of(*chosen[first]), *chosen[first]);
   const auto may_have = [&](Side side) {
     return is_covered(edges.front().depths[side], edges.front().depth_of(side));
   };
@@ -297,11 +368,9 @@ std::shared_ptr<const PhotoBorder> common_border(std::span<const View* const> ph
     return nullptr;
   std::vector<std::optional<Edges>> others(chosen.size() - first);
   in_parallel(others.size(), [&](std::size_t i) { others[i] = edges_of(*chosen[first + i]); });
-  for (std::optional<Edges>& found : others) {
-    if (tells(found)) edges.push_back(std::move(*found));
-  }
+  for (std::size_t i = 0; i < others.size(); ++i) take(std::move(others[i]), *chosen[first + i]);
   if (edges.size() < kLeastPhotos) return nullptr;
-  auto [top, bottom, left, right] = hidden_depths(edges, is_fisheye(photos.front()->source_camera));
+  auto [top, bottom, left, right] = hidden_depths(edges, cameras);
   const int width = edges.front().width, height = edges.front().height;
   // Rows that are black altogether are of bars above and below, or all of it is a black ground.
   const bool above = !top.empty() || !bottom.empty(), beside = !left.empty() || !right.empty();
@@ -316,21 +385,41 @@ std::shared_ptr<const PhotoBorder> common_border(std::span<const View* const> ph
   return std::make_shared<const PhotoBorder>(std::move(border));
 }
 
+std::vector<const View*> training_photos(std::span<View* const> photos) {
+  std::vector<const View*> out;
+  std::copy_if(photos.begin(), photos.end(), std::back_inserter(out),
+               [](const View* view) { return !view->test; });
+  return out;
+}
+
+void set_border(std::span<View* const> photos) {
+  const std::vector<const View*> training = training_photos(photos);
+  if (training.size() < kLeastPhotos) return;
+  const auto border = common_border(training);
+  for (View* view : photos) view->border = border;
+}
+
+// The photos by their folders, where these are few and tell as much each as all photos would.
+std::vector<std::vector<View*>> clips_of(const std::vector<View*>& photos) {
+  std::map<std::filesystem::path, std::vector<View*>> folders;
+  for (View* view : photos) folders[view->image_path.parent_path()].push_back(view);
+  const bool tell = std::all_of(folders.begin(), folders.end(), [](const auto& folder) {
+    return training_photos(folder.second).size() >= kMostPhotos;
+  });
+  if (!tell || folders.size() > kMostFolders) return {photos};
+  std::vector<std::vector<View*>> out;
+  for (auto& [folder, clip] : folders) out.push_back(std::move(clip));
+  return out;
+}
+
 }  // namespace
 
 void find_borders(std::vector<View>& views) {
-  std::map<std::pair<int, int>, std::vector<const View*>> sizes;
-  for (const View& view : views) {
-    if (!view.test) sizes[{view.source_camera.width, view.source_camera.height}].push_back(&view);
-  }
+  std::map<std::pair<int, int>, std::vector<View*>> sizes;
+  for (View& view : views)
+    sizes[{view.source_camera.width, view.source_camera.height}].push_back(&view);
   for (const auto& [size, photos] : sizes) {
-    if (photos.size() < kLeastPhotos) continue;
-    const auto border = common_border(photos);
-    if (!border) continue;
-    for (View& view : views) {
-      if (view.source_camera.width == size.first && view.source_camera.height == size.second)
-        view.border = border;
-    }
+    for (const std::vector<View*>& clip : clips_of(photos)) set_border(clip);
   }
 }
 

@@ -9,13 +9,15 @@
 namespace raysplats::io {
 
 /// Gives views the black border that all photos of their size have (View::border): the bars of a
-/// letterboxed video, what lies around the circle of a fisheye. At most eight training photos of a
-/// size tell, evenly spread, and one that has no black edge tells at once; fewer than three tell of
+/// letterboxed video, what lies around the circle of a fisheye or an endoscope. Few folders that
+/// hold many photos each have borders of their own, as several clips. At most eight training photos
+/// tell, evenly spread, and one that has no black edge tells at once; fewer than three tell of
 /// nothing, and what cannot be read of nothing either.
 ///
 /// A border ends in the same places in most of these photos, along straight lines, bent ones near
-/// the photo's edge, or on the circle of a fisheye: a black ground around a body, or a night sky,
-/// seldom does.
+/// the photo's edge, or on a circle. So does a black ground around a body on a turntable: there the
+/// cameras look at one place from around it, so exactly that the edges are the outline of one
+/// cylinder or ball for all of them, and no border is found.
 void find_borders(std::vector<View>& views);
 
 /// Whether the photo of a view has the border that was found in others, and shows no more than

@@ -40,7 +40,30 @@ struct Photos {
   int count = kPhotos;
   std::string camera = "\"camera_angle_x\": 0.8";
   int channels = 3;
+  std::function<std::string(int photo)> pose = [](int photo) { return matrix_json(photo); };
+  std::function<std::string(int photo)> folder = [](int) { return std::string(); };
 };
+
+// Of a level camera at (x, y), turned to the left by an angle from looking along -y.
+std::string level_pose(double x, double y, double turn) {
+  const std::string c = std::to_string(-std::cos(turn)), s = std::to_string(-std::sin(turn));
+  const std::string back = std::to_string(std::cos(turn));
+  return "[[" + c + ", 0, " + s + ", " + std::to_string(x) + "], [" + s + ", 0, " + back + ", " +
+         std::to_string(y) + "], [0, 1, 0, 0], [0, 0, 0, 1]]";
+}
+
+// As of a turntable: level, on a circle, to its middle.
+std::string turntable(int photo) {
+  const double angle = 0.5 * photo;
+  return level_pose(-4 * std::sin(angle), 4 * std::cos(angle), angle);
+}
+
+// Around something too, as by hand.
+std::string walk_around(int photo) {
+  const double angle = 0.5 * photo, away = 4 + 0.8 * std::sin(2.3 * photo);
+  return level_pose(-away * std::sin(angle), away * std::cos(angle),
+                    angle + 0.1 * std::sin(1.7 * photo));
+}
 
 void write_photos(const Scratch& scratch, const Black& black, const Photos& photos = {}) {
   std::string frames;
@@ -52,10 +75,10 @@ void write_photos(const Scratch& scratch, const Black& black, const Photos& phot
         for (int c = 0; c < 3; ++c) image.at(x, y, c) = value;
       }
     }
-    const std::string name = "photo_" + std::to_string(10 + photo) + ".png";
+    const std::string name = photos.folder(photo) + "photo_" + std::to_string(10 + photo) + ".png";
     write_image(scratch / name, image);
     frames += std::string(photo > 0 ? ", " : "") + "{\"file_path\": \"" + name +
-              "\", \"transform_matrix\": " + matrix_json(photo) + "}";
+              "\", \"transform_matrix\": " + photos.pose(photo) + "}";
   }
   write_bytes(scratch / "transforms.json", "{" + photos.camera + ", \"frames\": [" + frames + "]}");
 }
@@ -170,16 +193,6 @@ TEST_CASE("what is black without being a border counts") {
   const auto moving_body = [](int photo, int x, int y) {
     return !(x >= 8 + 2 * photo && x < 28 + 2 * photo && y >= 6 && y < 40);
   };
-  const auto standing_body = [](int, int x, int y) {
-    return !(x >= 20 && x < 44 && y >= 8 && y < 42);
-  };
-  // Round, and as wide as the photo's half.
-  const auto standing_ball = [](int, int x, int y) { return std::hypot(x - 32, y - 24) > 20; };
-  // A can that turns: its edges are those of a window, but for the bent rim.
-  const auto standing_can = [](int, int x, int y) {
-    const double u = (x + 0.5 - 32) / 22;
-    return std::abs(u) > 1 || std::abs(y + 0.5 - 24) > 15 + 5 * std::sqrt(1 - u * u);
-  };
   // A pillar that leaves the photo above and below, seen from above.
   const auto standing_pillar = [](int, int x, int y) {
     return std::abs(x + 0.5 - 32) > 21 - 0.06 * y;
@@ -190,12 +203,84 @@ TEST_CASE("what is black without being a border counts") {
   const auto nothing = [](int, int, int) { return false; };
   const auto everything = [](int, int, int) { return true; };
   for (const Black& black :
-       {Black(moving_body), Black(standing_body), Black(standing_ball), Black(standing_can),
-        Black(standing_pillar), Black(night_sky), Black(hill_at_night), Black(one_row),
-        Black(nothing), Black(everything)}) {
+       {Black(moving_body), Black(standing_pillar), Black(night_sky), Black(hill_at_night),
+        Black(one_row), Black(nothing), Black(everything)}) {
     const Scratch scratch;
     write_photos(scratch, black);
     CHECK_FALSE(has_borders(scratch));
+  }
+}
+
+TEST_CASE("edges that outline one body for cameras around it are no border, and others are") {
+  const auto body = [](int, int x, int y) { return !(x >= 20 && x < 44 && y >= 8 && y < 42); };
+  const auto ball = [](int, int x, int y) {
+    return std::hypot(x + 0.5 - kWidth / 2, y + 0.5 - kHeight / 2) > 20;
+  };
+  // Its edges are those of a window, but for the bent rim.
+  const auto can = [](int, int x, int y) {
+    const double u = (x + 0.5 - 32) / 22;
+    return std::abs(u) > 1 || std::abs(y + 0.5 - 24) > 15 + 5 * std::sqrt(1 - u * u);
+  };
+  // Leaves the photo above and below, and one on the right too.
+  const auto column = [](int, int x, int) { return x < 14 || x >= kWidth - 14; };
+  const auto wide_column = [](int, int x, int) { return x < 14; };
+  for (const Black& black :
+       {Black(body), Black(ball), Black(can), Black(column), Black(wide_column)}) {
+    const Scratch scratch;
+    write_photos(scratch, black, {.pose = turntable});
+    CHECK_FALSE(has_borders(scratch));
+  }
+  const auto lying = [](int, int, int y) { return y < 9 || y >= kHeight - 9; };
+  const Scratch letterboxed;
+  write_photos(letterboxed, lying, {.pose = turntable});
+  CHECK(has_borders(letterboxed));
+  for (const Black& black : {Black(body), Black(ball), Black(column), Black(wide_column)}) {
+    const Scratch scratch;
+    write_photos(scratch, black, {.pose = walk_around});
+    const Wrong found = wrong(scratch, black);
+    CHECK(found.left < 0.01);
+    CHECK(found.hidden < 0.08);
+  }
+}
+
+TEST_CASE("a ball is no circle of a fisheye") {
+  const auto circle = [](int, int x, int y) {
+    return std::hypot(x + 0.5 - kWidth / 2, y + 0.5 - kHeight / 2) > 20;
+  };
+  const Scratch ball;
+  write_photos(ball, circle, {.camera = kFisheye, .pose = turntable});
+  CHECK_FALSE(has_borders(ball));
+  const Scratch lens;
+  write_photos(lens, circle, {.camera = kFisheye, .pose = walk_around});
+  CHECK(has_borders(lens));
+}
+
+TEST_CASE("a vertical video may have bars on all sides") {
+  const auto window = [](int, int x, int y) {
+    return x < 22 || x >= kWidth - 22 || y < 5 || y >= kHeight - 5;
+  };
+  const Scratch scratch;
+  write_photos(scratch, window);
+  const Wrong found = wrong(scratch, window);
+  CHECK(found.left < 0.01);
+  CHECK(found.hidden < 0.05);
+}
+
+TEST_CASE("clips in folders of their own have borders of their own") {
+  const auto clips = [](int photo, int x, int y) {
+    const int bar = photo < 12 ? 5 : 10;
+    return photo >= 24 ? x < 8 : y < bar || y >= kHeight - bar;
+  };
+  const auto folder = [](int photo) { return "clip_" + std::to_string(photo / 12) + "/"; };
+  const Scratch scratch;
+  write_photos(scratch, clips, {.count = 36, .folder = folder});
+  const Dataset dataset = load_dataset(scratch.path());
+  REQUIRE(dataset.views.size() == 36);
+  for (const View& view : dataset.views) {
+    REQUIRE(view.border);
+    const std::string clip = view.image_path.parent_path().filename().string();
+    CHECK(view.border->top.front() == (clip == "clip_0" ? 6 : clip == "clip_1" ? 11 : 0));
+    CHECK(view.border->left.front() == (clip == "clip_2" ? 9 : 0));
   }
 }
 
