@@ -4,7 +4,9 @@
 usage: browser_controls_test.py PROGRAM [FOLDER]     (screenshots go to FOLDER)"""
 import math
 import os
+import subprocess
 import sys
+import tempfile
 
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.actions.wheel_input import ScrollOrigin
@@ -14,7 +16,8 @@ from selenium.webdriver.support.select import Select
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from browser import main  # noqa: E402
-from page_case import ModelCase  # noqa: E402
+from page_case import ModelCase, PageCase  # noqa: E402
+from program import write_model  # noqa: E402
 
 
 class ControlsTest(ModelCase):
@@ -179,6 +182,34 @@ class ControlsTest(ModelCase):
         for part in (0, 2):  # the page and its stage
             self.assertGreater(shades["light"][part][0], 600)
             self.assertLess(shades["dark"][part][0], 150)
+        self.assertEqual(self.console(), [])
+
+
+class FarCropTest(PageCase):
+    """A model whose coordinates begin somewhere else than those of its data set."""
+
+    def arguments(self):
+        folder = self.enterContext(tempfile.TemporaryDirectory(prefix="raysplats_browser_"))
+        model = os.path.join(folder, "model.ply")
+        write_model(model, (500000, 4000000, 100))
+        return [model]
+
+    def test_convert_keeps_what_is_in_the_box(self):
+        self.rest()
+        self.page.find_element(By.ID, "show-crop").click()
+        for name, value in (("low-x", -0.8), ("high-x", 3.2), ("low-y", -2.7), ("high-y", 1.3), ("high-z", 4)):
+            self.slide(f"crop-{name}", value)
+        low, high = ([float(self.page.find_element(By.ID, f"crop-{end}-{axis}").get_attribute("value")) for axis in "xyz"]
+                     for end in ("low", "high"))
+        places = [(x, 0, 0) for x in (-1, 0, 1)] + [(i % 10 - 4.5, i // 10 - 4.5, 3) for i in range(100)]
+        inside = sum(all(a <= x <= b for a, x, b in zip(low, place, high)) for place in places)
+        self.assertGreater(inside, 5)
+        out = os.path.join(self.viewer.folder.name, "part.ply")
+        option = self.page.find_element(By.ID, "crop-text").text.split()
+        told = subprocess.run([self.program, "convert", self.viewer.model, "-o", out, *option],
+                              capture_output=True, text=True)
+        self.assertEqual(told.returncode, 0, told.stderr)
+        self.assertRegex(told.stdout, f"^{inside} of 103 Gaussians")
         self.assertEqual(self.console(), [])
 
 

@@ -435,7 +435,7 @@ async function start() {
   $('missing').hidden = missing.length === 0;
   $('missing').textContent = `Not here, because of its surfaces: ${missing.join(', ')}.`;
   cameras.fill(state.cameras, state.center);
-  crop.begin(state.center, state.radius);
+  crop.begin(state.center, state.radius, state.origin);
   $('mesh-section').hidden = !state.takes_meshes;
   meshes.begin(state.radius);
   tell('Waiting for the first picture; kernels may have to be compiled');

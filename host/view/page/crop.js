@@ -4,6 +4,7 @@
 
 const REACH = 2; // of the sliders, in radii of the model
 const STEPS = 200;
+const MOST_PLACES = 100; // of toFixed()
 const NEAR = 1e-3; // depth, in radii, in front of which edges are cut
 
 export class Crop {
@@ -15,8 +16,10 @@ export class Crop {
     this.shown = false;
   }
 
-  begin(center, radius) {
+  // `origin` is that of the model in the coordinates of its data set, which `convert` crops in.
+  begin(center, radius, origin) {
     this.radius = radius;
+    this.origin = origin;
     this.low = center.map((x) => x - radius / 2);
     this.high = center.map((x) => x + radius / 2);
     const rows = ['x', 'y', 'z'].flatMap((name, axis) => ['low', 'high'].map((end) => {
@@ -44,7 +47,9 @@ export class Crop {
   }
 
   say() {
-    const numbers = (v) => v.map((x) => Number(x.toPrecision(4))).join(',');
+    // As fine as the box needs, wherever it lies.
+    const places = Math.min(Math.max(0, 3 - Math.floor(Math.log10(this.radius))), MOST_PLACES);
+    const numbers = (v) => v.map((x, axis) => Number((x + this.origin[axis]).toFixed(places))).join(',');
     this.text.textContent = `--crop-min ${numbers(this.low)} --crop-max ${numbers(this.high)}`;
   }
 
