@@ -230,10 +230,11 @@ void run(const CLI::App& command, const Options& options) {
     return;
   }
   const BenchReport report = run_bench(context, bench, chosen);
-  fmt::print("{}", bench_table(report));
+  // First, so that no trouble with standard output loses it.
   if (!options.json.empty()) write_text_file(options.json, bench_json(report));
   if (!options.csv.empty()) write_text_file(options.csv, bench_csv(report));
   if (!options.html.empty()) write_text_file(options.html, bench_page(report));
+  fmt::print("{}", bench_table(report));
   if (options.device.profile) fmt::print("{}", context.profile_table());
 }
 

@@ -65,7 +65,9 @@ std::vector<double> weights(const Options& options,
     spdlog::info("no views are known (--data): the largest and most opaque Gaussians are kept");
     return {};
   }
-  spdlog::info("what is seen in {} is kept", counted(cameras.size(), "view"));
+  const std::string share =
+      cameras.size() > kMostContributionViews ? fmt::format("{} of ", kMostContributionViews) : "";
+  spdlog::info("what is seen in {}{} is kept", share, counted(cameras.size(), "view"));
   const std::unique_ptr<Context> context = open_context(options.device);
   return contributions(*context, read_model(source.file, encoding), cameras, trace_options(source),
                        mirrors_of(source));

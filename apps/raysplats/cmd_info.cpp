@@ -20,6 +20,7 @@
 #include "io/json_file.hpp"
 #include "io/model_file.hpp"
 #include "io/scene_file.hpp"
+#include "options.hpp"
 #include "raysplats/error.hpp"
 #include "run/model_source.hpp"
 
@@ -31,6 +32,7 @@ using Json = nlohmann::ordered_json;
 struct Options {
   std::string path;
   bool json = false;
+  DataSettings data;
 };
 
 void print_json(const Json& json) { fmt::print("{}\n", io::json_text(json, 2)); }
@@ -67,12 +69,17 @@ void run(const Options& options) {
   } else if (!is_model_folder(path)) {
     other = describe_colmap(path);
   }
+  const bool is_dataset = folder && !other && !is_model_folder(path);
+  if (!is_dataset && options.data.has("borders")) {
+    throw UsageError(
+        fmt::format("--borders is about the photos of a data set, and {} is none", options.path));
+  }
   if (other) {
     (*other)["path"] = options.path;
     options.json ? print_json(*other) : print_file(*other);
-  } else if (folder && !is_model_folder(path)) {
+  } else if (is_dataset) {
     check_folder(path);
-    const Json dataset = describe_dataset(path);
+    const Json dataset = describe_dataset(path, options.data.over({}));
     options.json ? print_json(dataset) : print_dataset(dataset);
   } else if (!folder && is_scene_file(path)) {
     const Json scene = describe_scene(path);
@@ -101,6 +108,7 @@ Command add_info_command(CLI::App& app) {
       ->required()
       ->type_name("");
   command->add_flag("--json", options->json, "Print JSON");
+  add_borders_flag(*command, options->data);
   return {command, [options] { run(*options); }};
 }
 

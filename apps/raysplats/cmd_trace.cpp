@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <chrono>
 #include <filesystem>
@@ -38,6 +39,12 @@ void run(const Options& options) {
     throw UsageError(
         fmt::format("--output {}: a .npy file holds one array and there are five, give a .npz",
                     options.output));
+  }
+  if (source.trained && !source.trained->mirrors.empty()) {
+    spdlog::warn(
+        "{} was trained with mirrors, which rays of your own do not meet: only what Gaussians show "
+        "is traced",
+        source.file.string());
   }
   const io::RayList list = io::read_rays(options.rays, source.origin);
   const Gaussians gaussians = in_morton_order(read_model(source.file));

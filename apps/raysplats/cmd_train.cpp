@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "commands.hpp"
+#include "io/sized_dataset.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trainer.hpp"
@@ -86,13 +87,18 @@ ChosenKeys check_choices(const CLI::App& command, Options& options) {
   return chosen;
 }
 
-Dataset load(const CLI::App& command, Options& options, const DeviceInfo& device) {
+/// Chooses the size of photos, as far as nothing says it, and by --quality the length of the run.
+/// `in_files`: as DownscaleChoice has it.
+void choose_size(const CLI::App& command,
+                 Options& options,
+                 const Dataset& dataset,
+                 double in_files,
+                 const DeviceInfo& device) {
   DatasetOptions& data = options.train.data;
-  Dataset dataset = load_dataset(options.data, data);
   // On the command line, by a --config or the run that goes on.
   const bool sized = data.downscale > 0;
   if (options.quality.empty()) {
-    if (sized) return dataset;
+    if (sized) return;
     std::optional<double> seconds;
     if (!options.time.empty()) seconds = parse_duration("--time", options.time);
     data.downscale = fitting_downscale(dataset, device.type, seconds);
@@ -102,15 +108,23 @@ Dataset load(const CLI::App& command, Options& options, const DeviceInfo& device
     const bool given = command.get_option("--iterations")->count() > 0;
     if (!given && options.train.iterations == TrainOptions().iterations)
       options.train.iterations = choice.iterations;
-    if (sized) return dataset;
+    if (sized) return;
     data.downscale = choice.downscale;
   }
-  if (data.downscale == 1) return dataset;
+  if (data.downscale == 1) return;
+  data.downscale *= in_files;  // it was counted from what was read
   spdlog::info("Photos are reduced {:.3g} times each way{}; --downscale 1 keeps them",
                data.downscale,
                options.quality.empty() ? ", because they are large"
                                        : ", as --quality " + options.quality + " does");
-  return load_dataset(options.data, data);
+}
+
+Dataset load(const CLI::App& command, Options& options, const DeviceInfo& device) {
+  return io::load_sized_dataset(options.data, options.train.data,
+                                [&](const Dataset& dataset, double in_files) {
+                                  choose_size(command, options, dataset, in_files, device);
+                                  return options.train.data.factor();
+                                });
 }
 
 /// Sets the length of a run by --time, and says beforehand how long it will take. Returns its
@@ -163,8 +177,9 @@ std::unique_ptr<view::RunView> show(Context& context,
 void report(const std::filesystem::path& folder, const char* state) {
   const std::filesystem::path file = folder / "report.html";
   try {
-    write_run_report(folder, file);
+    const std::string warnings = write_run_report(folder, file);
     fmt::print("Report: {}\n", file.string());
+    if (!warnings.empty()) fmt::print("{}\n", warnings);
   } catch (const std::exception& error) {
     spdlog::warn("the run is {}, but has no report: {}; try again by 'raysplats report {}'", state,
                  error.what(), folder.string());

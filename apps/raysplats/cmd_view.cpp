@@ -223,6 +223,7 @@ void view_model(const Options& options) {
 
 void check(const Options& options) {
   options.data.check_used(false);
+  if (const std::optional<glm::dvec3> up = up_of(options)) check_up(*up);
   if (options.data.data.empty() && options.data.settings.has("downscale"))
     throw UsageError("--downscale divides the sizes of photos: add --data DATASET");
 }

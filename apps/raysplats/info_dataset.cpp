@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "info_file.hpp"
-#include "raysplats/dataset.hpp"
 #include "util/number_text.hpp"
 
 namespace raysplats::cli {
@@ -72,9 +71,9 @@ Json describe(const Dataset& dataset) {
 
 }  // namespace
 
-Json describe_dataset(const std::filesystem::path& path) {
+Json describe_dataset(const std::filesystem::path& path, const DatasetOptions& options) {
   Json out{{"type", "dataset"}, {"path", path.string()}};
-  out.update(describe(load_dataset(path)));
+  out.update(describe(load_dataset(path, options)));
   return out;
 }
 

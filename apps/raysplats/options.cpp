@@ -145,6 +145,10 @@ CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags, const std::string& 
   return data;
 }
 
+void add_borders_flag(CLI::App& app, DataSettings& settings) {
+  add_setting(app, settings, "borders");
+}
+
 Split DataFlags::chosen_split() const {
   const std::string name = split.value_or("test");
   if (name == "train") return Split::kTrain;

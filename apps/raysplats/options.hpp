@@ -74,6 +74,8 @@ CLI::Option* add_data_flags(CLI::App& app,
                             DataFlags& flags,
                             const std::string& split = "test (default), train or all");
 DataError no_views(const DataFlags& flags);
+/// --borders, for commands that say what a data set is.
+void add_borders_flag(CLI::App& app, DataSettings& settings);
 
 /// --overwrite: outputs may take the place of what is there. `help` says of what.
 void add_overwrite_flag(

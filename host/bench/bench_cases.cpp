@@ -3,6 +3,7 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <chrono>
@@ -34,27 +35,44 @@ std::string tuning_text(const DeviceInfo& device) {
                      tuning.group, tuning.bvh ? ", bvh" : "");
 }
 
+// Of a model's numbers, whatever file they are read from.
+std::string fingerprint(const Gaussians& model) {
+  XXH64_hash_t hash = 0;
+  for (const std::vector<float>* values :
+       {&model.means, &model.quaternions, &model.log_scales, &model.opacities, &model.sh})
+    hash = XXH64(values->data(), values->size() * sizeof(float), hash);
+  return fmt::format("{:016x}", hash);
+}
+
 std::map<std::string, std::string> option_texts(const Context& context,
                                                 const BenchOptions& options,
                                                 const BenchModel* model) {
   const int width = model != nullptr ? model->camera.width : options.width;
   const int height = model != nullptr ? model->camera.height : options.height;
-  return {{"resolution", fmt::format("{}x{}", width, height)},
-          {"sh-degree",
-           std::to_string(model != nullptr ? model->gaussians.sh_degree : options.sh_degree)},
-          {"repeat", std::to_string(options.repeat)},
-          {"rays", std::to_string(options.rays)},
-          {"triangles", std::to_string(options.triangles)},
-          {"packet-shape", packet_shape_name(options.trace.packet_shape)},
-          {"packet-width", std::to_string(options.trace.packet_width)},
-          {"hit-order", hit_order_name(options.trace.hit_order)},
-          {"quantile", fmt::format("{:g}", options.trace.quantile)},
-          {"min-transmittance", fmt::format("{:g}", options.trace.min_transmittance)},
-          {"max-hits", std::to_string(options.trace.max_hits)},
-          {"adaptive-radius", options.trace.adaptive_radius ? "on" : "off"},
-          {"tuning", tuning_text(context.device())},
-          {"memory-budget",
-           fmt::format("{} MiB", MemoryShares(options.trace, context.device()).all() >> 20)}};
+  std::map<std::string, std::string> out{
+      {"resolution", fmt::format("{}x{}", width, height)},
+      {"sh-degree",
+       std::to_string(model != nullptr ? model->gaussians.sh_degree : options.sh_degree)},
+      {"repeat", std::to_string(options.repeat)},
+      {"rays", std::to_string(options.rays)},
+      {"triangles", std::to_string(options.triangles)},
+      {"packet-shape", packet_shape_name(options.trace.packet_shape)},
+      {"packet-width", std::to_string(options.trace.packet_width)},
+      {"hit-order", hit_order_name(options.trace.hit_order)},
+      {"quantile", fmt::format("{:g}", options.trace.quantile)},
+      {"min-transmittance", fmt::format("{:g}", options.trace.min_transmittance)},
+      {"max-hits", std::to_string(options.trace.max_hits)},
+      {"adaptive-radius", options.trace.adaptive_radius ? "on" : "off"},
+      {"near", fmt::format("{:g}", options.trace.near_depth)},
+      {"launch-budget-ms", fmt::format("{:g}", options.trace.launch_budget_ms)},
+      {"tuning", tuning_text(context.device())},
+      {"memory-budget",
+       fmt::format("{} MiB", MemoryShares(options.trace, context.device()).all() >> 20)}};
+  if (model != nullptr) {
+    out["model"] = fingerprint(model->gaussians);
+    out["view"] = model->camera.name;
+  }
+  return out;
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <set>
 
 namespace raysplats {
 namespace {
@@ -32,6 +32,12 @@ void note(std::vector<std::string>& out,
   if (before != after) out.push_back(fmt::format("{}: {} -> {}", what, before, after));
 }
 
+// Earlier versions keep fewer.
+std::string option_of(const BenchReport& report, const std::string& name) {
+  const auto found = report.options.find(name);
+  return found == report.options.end() ? "not in the file" : found->second;
+}
+
 }  // namespace
 
 BenchComparison compare_reports(const BenchReport& before, const BenchReport& after) {
@@ -39,12 +45,11 @@ BenchComparison compare_reports(const BenchReport& before, const BenchReport& af
   note(out.differing, "device", before.device, after.device);
   note(out.differing, "driver", before.driver, after.driver);
   note(out.differing, "raysplats", before.version, after.version);
-  std::map<std::string, std::pair<std::string, std::string>> options;
-  for (const auto& [name, value] : before.options) options[name].first = value;
-  for (const auto& [name, value] : after.options) options[name].second = value;
-  for (const auto& [name, values] : options) {
-    note(out.differing, "--" + name, values.first, values.second);
-  }
+  std::set<std::string> options;
+  for (const auto& [name, value] : before.options) options.insert(name);
+  for (const auto& [name, value] : after.options) options.insert(name);
+  for (const std::string& name : options)
+    note(out.differing, "--" + name, option_of(before, name), option_of(after, name));
   for (const BenchRow& row : before.rows) {
     const BenchRow* other = find_row(after, row.id());
     if (other == nullptr) {

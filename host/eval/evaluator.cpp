@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <memory>
 #include <optional>
 #include <set>
 #include <utility>
@@ -18,6 +19,7 @@
 #include "raysplats/io.hpp"
 #include "render/frame_writer.hpp"
 #include "scene/even_choice.hpp"
+#include "scene/image_check.hpp"
 #include "scene/sharpness.hpp"
 #include "trace/sky.hpp"
 #include "util/atomic_file.hpp"
@@ -186,6 +188,16 @@ std::vector<std::size_t> spread(const std::vector<std::size_t>& indices, std::si
   return out;
 }
 
+// Of a picture that a caller gives of a view.
+void check_size(const Image& image, const Camera& camera, int channels, const std::string& what) {
+  if (image.width != camera.width || image.height != camera.height || image.channels < channels) {
+    throw UsageError(fmt::format(
+        "{} is {}x{}x{}, its camera {}x{}: give the camera's size and at least {} channels", what,
+        image.width, image.height, image.channels, camera.width, camera.height, channels));
+  }
+  check_image(image, what);
+}
+
 std::vector<std::string> names_of(const Dataset& dataset, const std::vector<std::size_t>& views) {
   return frame_names(cameras_of(dataset, views));
 }
@@ -278,6 +290,22 @@ class Evaluation {
 
  private:
   const View& view(std::size_t i) const { return dataset_.views[views_[i]]; }
+  std::shared_ptr<const ViewPicture> photo_of(std::size_t i) const {
+    if (!options_.photo) return std::make_shared<const ViewPicture>(load_view_picture(view(i)));
+    std::shared_ptr<const ViewPicture> photo = options_.photo(views_[i]);
+    if (!photo) throw UsageError(fmt::format("There is no photo of {}", names_[i]));
+    check_size(photo->rgba, view(i).camera, 4, "The photo of " + names_[i]);
+    if (!photo->weight.data.empty())
+      check_size(photo->weight, view(i).camera, 1, "The weight of the photo of " + names_[i]);
+    return photo;
+  }
+  // Empty where it was stopped, and of pictures that another rank compares.
+  Image rendered(std::size_t i, const Camera& camera) const {
+    Image traced = render_(camera);
+    if (!compares_ || traced.data.empty()) return {};
+    check_size(traced, camera, 3, "The render of " + names_[i]);
+    return traced;
+  }
   std::string picture_of(std::size_t i) const { return names_[i] + ".png"; }
   void write_picture(std::size_t i, const Comparison& pair) const {
     write_image(output_ / picture_of(i), side_by_side(pair.photo, pair.render));
@@ -291,29 +319,22 @@ class Evaluation {
 
   // None where it was stopped, and of pictures that another rank compares.
   std::optional<Comparison> compare_view(std::size_t i) const {
-    Image traced = render_(view(i).camera);
-    if (!compares_ || traced.data.empty()) return std::nullopt;
-    const ViewPicture picture = load_view_picture(view(i));
-    const Image& rgba = picture.rgba;
-    if (traced.width != rgba.width || traced.height != rgba.height || traced.channels < 3) {
-      throw UsageError(fmt::format(
-          "The render of {} is {}x{}x{}, its photo {}x{}; render at the camera's size", names_[i],
-          traced.width, traced.height, traced.channels, rgba.width, rgba.height));
-    }
-    return compared(std::move(traced), picture);
+    Image traced = rendered(i, view(i).camera);
+    if (traced.data.empty()) return std::nullopt;
+    return compared(std::move(traced), *photo_of(i));
   }
 
   // After compare_view(), whose pair that is; none where it was stopped.
   std::optional<double> aligned_psnr(std::size_t i, const Comparison& pair) const {
-    const ViewPicture picture = load_view_picture(view(i));
+    const std::shared_ptr<const ViewPicture> photo = photo_of(i);
     const auto shown = [&](const Camera& camera) {
-      Image traced = render_(camera);
+      Image traced = rendered(i, camera);
       if (!options_.align_colors || traced.data.empty()) return traced;
-      return color_corrected(compared(std::move(traced), picture).render, pair.photo, pair.mask);
+      return color_corrected(compared(std::move(traced), *photo).render, pair.photo, pair.mask);
     };
     std::optional<AlignedView> aligned = align_view(shown, view(i).camera, pair.photo, pair.mask);
     if (!aligned) return std::nullopt;
-    return psnr_of(compared(std::move(aligned->render), picture));
+    return psnr_of(compared(std::move(aligned->render), *photo));
   }
 
   // Adds a view to those of this rank. Returns whether to go on.

@@ -5,6 +5,7 @@
 
 #include "io/image_codec.hpp"
 #include "raysplats/error.hpp"
+#include "scene/image_check.hpp"
 #include "util/file_kind.hpp"
 
 namespace raysplats {
@@ -31,6 +32,8 @@ double Lpips::distance(const Image& image, const Image& photo) {
         "LPIPS compares RGB images of equal size; these are {}x{}x{} and {}x{}x{}", image.width,
         image.height, image.channels, photo.width, photo.height, photo.channels));
   }
+  check_image(image, "The image");
+  check_image(photo, "The photo");
   return impl_->network->distance(image, photo);
 }
 

@@ -2,6 +2,7 @@
 #include "io/camera_list.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <cmath>
 #include <cstddef>
@@ -130,6 +131,7 @@ bool is_camera_list(const std::filesystem::path& path) {
 
 std::vector<Camera> read_listed_views(const std::filesystem::path& path) {
   std::vector<Camera> out;
+  std::size_t without_lens = 0;
   for (const Json& view : entries_of(path)) {
     std::optional<Camera> camera = camera_of(view, path, out.size());
     if (!camera) {
@@ -140,7 +142,16 @@ std::vector<Camera> read_listed_views(const std::filesystem::path& path) {
     if (camera->name.empty()) camera->name = fmt::format("frame_{:04d}", out.size());
     require_believable(*camera,
                        fmt::format("{}: the camera of entry {}", path.string(), out.size()));
+    const bool named = view.contains("camera_model") || view.contains("cx");
+    without_lens += !named && camera->model == CameraModel::kPinhole ? 1 : 0;
     out.push_back(std::move(*camera));
+  }
+  if (without_lens > 0) {
+    spdlog::info(
+        "{} names no lenses or principal points, as other programs and early runs write it: its "
+        "cameras are taken for pinholes that look through the middle of their pictures; the data "
+        "set knows theirs",
+        path.string());
   }
   return out;
 }

@@ -21,7 +21,8 @@ std::vector<std::optional<Camera>> read_camera_list(const std::filesystem::path&
 bool is_camera_list(const std::filesystem::path& path);
 
 /// The same list where every entry has to be a view: throws DataError that names the first that is
-/// none. Views without a name are called frame_0000 and so on.
+/// none. Views without a name are called frame_0000 and so on. A line says where they are taken
+/// for pinholes because the list names no lenses.
 std::vector<Camera> read_listed_views(const std::filesystem::path& path);
 
 /// read_cameras() for a model that counts from `origin`: those of a transforms file count from the

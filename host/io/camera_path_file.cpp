@@ -154,16 +154,18 @@ CameraModel model_of(const std::filesystem::path& path, const Json& json) {
                   path.string(), type));
 }
 
-/// That of a keyframe or frame, of a fisheye as with_lens() takes it; no panorama has any.
+/// That of a keyframe or frame, or of those that name none, of a fisheye as with_lens() takes it;
+/// no panorama has any.
 double fov_of(const std::filesystem::path& path,
               const Json& entry,
+              const char* key,
               CameraModel model,
               double otherwise) {
-  const double fov = number(path, entry, "fov", kLeastFov, 360.0, otherwise);
+  const double fov = number(path, entry, key, kLeastFov, 360.0, otherwise);
   const double most = most_fov(CameraModel::kPinhole);
   if (model == CameraModel::kEquirectangular || fov <= most) return fov;
   fail(path,
-       fmt::format("has the 'fov' {:g} where at most {:g} degrees belong{}", fov, most,
+       fmt::format("has the '{}' {:g} where at most {:g} degrees belong{}", key, fov, most,
                    model == CameraModel::kFisheye ? ": that of a fisheye is, as in nerfstudio, "
                                                     "that of the pinhole with its focal length"
                                                   : ""));
@@ -190,14 +192,13 @@ Stored read_json(const std::filesystem::path& path) {
   const Json* keys = list("keyframes");
   if (!frames && !keys) fail(path, "has neither 'camera_path' nor 'keyframes' with entries");
   out.frames = frames != nullptr;
-  const double fov =
-      number(path, json, "default_fov", kLeastFov, most_fov(CameraModel::kPinhole), 50.0);
+  const double fov = fov_of(path, json, "default_fov", out.model, 50.0);
   const double transition = number(path, json, "default_transition_sec", 0, kMostSeconds, 1.0);
   for (const Json& entry : frames ? *frames : *keys) {
     if (!entry.is_object()) fail(path, "has an entry that is no object");
     Keyframe key;
     set_pose(path, matrix_of(path, entry, frames ? "camera_to_world" : "matrix"), key);
-    key.fov = fov_of(path, entry, out.model, fov);
+    key.fov = fov_of(path, entry, "fov", out.model, fov);
     key.seconds = io::json_flag(entry, "override_transition_enabled")
                       ? number(path, entry, "override_transition_sec", 0, kMostSeconds, transition)
                       : (frames ? 1.0 : transition);

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <iterator>
 #include <optional>
 #include <set>
 #include <span>
@@ -29,11 +28,12 @@
 #include "io/photo_views.hpp"
 #include "io/ply_points.hpp"
 #include "io/polycam.hpp"
+#include "io/repeated_photos.hpp"
+#include "io/sized_dataset.hpp"
 #include "io/transforms.hpp"
 #include "io/transforms_views.hpp"
 #include "raysplats/error.hpp"
 #include "util/file_kind.hpp"
-#include "util/number_text.hpp"
 
 namespace raysplats {
 namespace {
@@ -77,51 +77,6 @@ void set_origin(Dataset& dataset, std::span<const double> points, const DatasetO
 void sort_by_name(std::vector<View>& views) {
   std::stable_sort(views.begin(), views.end(),
                    [](const View& a, const View& b) { return a.camera.name < b.camera.name; });
-}
-
-std::set<fs::path> photos_of(const std::vector<View>& views, bool test) {
-  std::set<fs::path> photos;
-  for (const View& view : views) {
-    if (view.test == test) photos.insert(view.image_path.lexically_normal());
-  }
-  return photos;
-}
-
-/// Photos that are trained on measure nothing: those that are held out too are trained on no more,
-/// unless they are most of the photos.
-void part_held_out(std::vector<View>& views) {
-  const std::set<fs::path> held_out = photos_of(views, true), trained = photos_of(views, false);
-  std::vector<fs::path> shared;
-  std::set_intersection(held_out.begin(), held_out.end(), trained.begin(), trained.end(),
-                        std::back_inserter(shared));
-  if (shared.empty()) return;
-  if (2 * shared.size() > trained.size()) {
-    spdlog::warn(
-        "{} of {} held-out photos are trained on as well, {} among them, as few would be left to "
-        "train on without them: their PSNR says nothing of unseen views",
-        shared.size(), held_out.size(), shared.front().string());
-    return;
-  }
-  spdlog::warn(
-      "{} of {} photos to train on are held out too, {} among them: they are not trained on",
-      shared.size(), trained.size(), shared.front().string());
-  std::erase_if(views, [&](const View& view) {
-    return !view.test && held_out.contains(view.image_path.lexically_normal());
-  });
-}
-
-/// Of photos on both sides part_held_out() tells.
-void warn_of_repeated_photos(const std::vector<View>& views) {
-  std::set<std::pair<fs::path, bool>> seen;
-  std::set<fs::path> repeated;
-  for (const View& view : views) {
-    const fs::path photo = view.image_path.lexically_normal();
-    if (!seen.emplace(photo, view.test).second) repeated.insert(photo);
-  }
-  if (repeated.empty()) return;
-  spdlog::warn("{} in more than one frame, {} the first",
-               counted(static_cast<double>(repeated.size()), "photo is", "photos are"),
-               repeated.begin()->string());
 }
 
 /// Gives the data set the points of a PLY; returns their positions as precise as they are there.
@@ -260,20 +215,26 @@ Dataset load_llff(const fs::path& root, DatasetOptions options) {
 /// Whether what is transparent in the photos is background.
 bool shows_cut_outs(const Dataset& dataset, AlphaUse use) {
   if (use != AlphaUse::kAuto) return use == AlphaUse::kCutout;
-  const io::Transparency found = io::transparency(dataset.views);
+  const auto [kind, count, exact] = io::transparency(dataset.views);
+  if (kind == io::Transparency::kNone && count > 0) {
+    spdlog::warn(
+        "{}{} of {} photos have something transparent: it does not count there (alpha = cutout "
+        "makes it background)",
+        exact ? "" : "about ", count, dataset.views.size());
+  }
   // Rendered photos have no lens that leaves a border.
-  if (dataset.kind == DatasetKind::kBlender) return found != io::Transparency::kNone;
-  if (found == io::Transparency::kBorder) {
+  if (dataset.kind == DatasetKind::kBlender) return kind != io::Transparency::kNone;
+  if (kind == io::Transparency::kBorder) {
     spdlog::info(
         "All photos are transparent in the same places, as at the edge of a lens: these do not "
         "count (alpha = cutout makes them background)");
   }
-  if (found == io::Transparency::kCutOut) {
+  if (kind == io::Transparency::kCutOut) {
     spdlog::info(
         "The photos are cut out: what is transparent in them is background (with alpha = ignore "
         "it does not count)");
   }
-  return found == io::Transparency::kCutOut;
+  return kind == io::Transparency::kCutOut;
 }
 
 void leave_out_borders(Dataset& dataset) {
@@ -341,48 +302,58 @@ Dataset load_named(const fs::path& file, const DatasetOptions& options) {
   return load_nerfstudio(file, options);
 }
 
-}  // namespace
-
-std::vector<std::size_t> Dataset::indices(Split split) const {
-  std::vector<std::size_t> out;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    if (split == Split::kAll || views[i].test == (split == Split::kTest)) out.push_back(i);
-  }
-  return out;
+void check_downscale(double factor) {
+  if (factor >= 1 && factor <= 1024) return;
+  throw UsageError(
+      fmt::format("The downscale factor is {}: it must lie between 1 and 1024", factor));
 }
 
-Dataset load_dataset(const fs::path& path, const DatasetOptions& given) {
-  DatasetOptions options = given;
-  if (given.downscale == 0) options.downscale = 1;
-  if (!(options.downscale >= 1 && options.downscale <= 1024)) {
-    throw UsageError(fmt::format("The downscale factor is {}: it must lie between 1 and 1024",
-                                 options.downscale));
-  }
-  if (options.test_every < 0) {
-    throw UsageError(
-        fmt::format("The test interval is {}: it must be 0 or more", options.test_every));
-  }
-  const bool is_named = is_transforms(path);
-  const fs::path root = is_named ? fs::absolute(path).parent_path() : path;
-  if (!is_folder(root)) {
-    throw DataError(fmt::format("The data set {} {}: give the folder of a data set", root.string(),
-                                is_file(root) ? "is a file" : "does not exist"));
-  }
+/// What the files of a data set say of its views and points; no photo is decoded. `path` may name
+/// one of the files in the folder `root`.
+Dataset read_views(const fs::path& path, const fs::path& root, const DatasetOptions& options) {
   Dataset dataset =
-      is_named ? load_named(root / path.filename(), options) : load_any(root, options);
+      path == root ? load_any(root, options) : load_named(root / path.filename(), options);
   dataset.root = root;
   if (dataset.views.empty()) {
     throw DataError(
         fmt::format("The data set {} has no views: there is nothing to train on", root.string()));
   }
-  part_held_out(dataset.views);
-  warn_of_repeated_photos(dataset.views);
+  io::part_held_out(dataset.views);
+  return dataset;
+}
+
+/// Reduced copies of photos that a data set may have at a size.
+std::optional<io::PhotoFolder> copies_at(const Dataset& dataset, double downscale) {
+  if (dataset.kind != DatasetKind::kColmap && dataset.kind != DatasetKind::kLlff)
+    return std::nullopt;
+  return io::reduced_copies(dataset.root, downscale);
+}
+
+/// Whether views have the same photos at either size.
+bool shares_photos(const Dataset& dataset, double one, double other) {
+  return one == other || (!copies_at(dataset, one) && !copies_at(dataset, other));
+}
+
+/// By what the photos of a data set that was read at a size are divided in their files.
+double factor_in_files(const Dataset& dataset, double downscale) {
+  const std::optional<io::PhotoFolder> copies = copies_at(dataset, downscale);
+  if (!copies) return 1;
+  // Another folder is used where these have not the photos.
+  const fs::path photo = dataset.views.front().image_path.lexically_normal().lexically_relative(
+      copies->path.lexically_normal());
+  return photo.string().starts_with("..") ? 1 : copies->factor;
+}
+
+/// Finds what photos that are decoded tell of all of them, and warns of what they do not say.
+void look_at_photos(Dataset& dataset, const DatasetOptions& options) {
+  io::warn_of_repeated_photos(dataset.views);
   io::warn_of_color_profiles(dataset.views);
   io::warn_of_folding_lenses(dataset.views);
+  io::warn_of_principal_points(dataset.views);
   dataset.alpha_is_background = shows_cut_outs(dataset, options.alpha);
   const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
   const auto masked = std::count_if(dataset.views.begin(), dataset.views.end(), has_mask);
-  io::warn_of_masks(dataset.views, root);
+  io::warn_of_masks(dataset.views, dataset.root);
   if (masked > 0) {
     for (const View& view : dataset.views) {
       if (has_mask(view)) io::check_mask(view);
@@ -400,6 +371,49 @@ Dataset load_dataset(const fs::path& path, const DatasetOptions& given) {
   }
   if (options.borders == BorderUse::kAuto && !dataset.alpha_is_background)
     leave_out_borders(dataset);
+}
+
+}  // namespace
+
+std::vector<std::size_t> Dataset::indices(Split split) const {
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (split == Split::kAll || views[i].test == (split == Split::kTest)) out.push_back(i);
+  }
+  return out;
+}
+
+Dataset load_dataset(const fs::path& path, const DatasetOptions& options) {
+  return io::load_sized_dataset(path, options, {});
+}
+
+Dataset io::load_sized_dataset(const fs::path& path,
+                               DatasetOptions options,
+                               const DownscaleChoice& choose) {
+  if (options.downscale == 0) options.downscale = 1;
+  check_downscale(options.downscale);
+  if (options.test_every < 0) {
+    throw UsageError(
+        fmt::format("The test interval is {}: it must be 0 or more", options.test_every));
+  }
+  const fs::path root = is_transforms(path) ? fs::absolute(path).parent_path() : path;
+  if (!is_folder(root)) {
+    throw DataError(fmt::format("The data set {} {}: give the folder of a data set", root.string(),
+                                is_file(root) ? "is a file" : "does not exist"));
+  }
+  Dataset dataset = read_views(path, root, options);
+  if (choose) {
+    const double read = options.downscale;
+    options.downscale = choose(dataset, factor_in_files(dataset, read));
+    check_downscale(options.downscale);
+    if (!shares_photos(dataset, read, options.downscale)) {
+      dataset = read_views(path, root, options);
+    } else {
+      for (View& view : dataset.views)
+        view.camera = io::picture_camera(view.source_camera, options.downscale, options.undistort);
+    }
+  }
+  look_at_photos(dataset, options);
   return dataset;
 }
 

@@ -6,6 +6,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "io/image_file.hpp"
@@ -123,6 +124,18 @@ std::optional<fs::path> find_respelt(const fs::path& folder, const fs::path& fil
     return same_but_spelling((named ? entry.filename() : entry.stem()).string(), name) &&
            has_image_extension(entry) && is_file(entry);
   });
+}
+
+std::optional<fs::path> find_reformatted(const fs::path& folder, const fs::path& file_path) {
+  if (!has_image_extension(file_path)) return std::nullopt;
+  std::optional<fs::path> found;
+  for (const char* extension : kImageExtensions) {
+    auto other = find_image(folder, fs::path(file_path).replace_extension(extension));
+    if (!other) continue;
+    if (found) return std::nullopt;
+    found = std::move(other);
+  }
+  return found;
 }
 
 std::optional<fs::path> find_moved(const fs::path& folder,

@@ -19,6 +19,11 @@ std::optional<std::filesystem::path> find_image(const std::filesystem::path& fol
 std::optional<std::filesystem::path> find_respelt(const std::filesystem::path& folder,
                                                   const std::filesystem::path& file_path);
 
+/// The single image that differs from that path in its extension alone: photos were converted, or
+/// the path says .jpeg of a .jpg.
+std::optional<std::filesystem::path> find_reformatted(const std::filesystem::path& folder,
+                                                      const std::filesystem::path& file_path);
+
 /// The image by the end of a path that was written elsewhere (C:/captures/fox/images/1.jpg): the
 /// longest that is there, of `least_parts` or more; a name alone also in the folder images.
 std::optional<std::filesystem::path> find_moved(const std::filesystem::path& folder,

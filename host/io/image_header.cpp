@@ -104,16 +104,28 @@ bool jpeg_has_profile(std::istream& stream) {
   return found;
 }
 
-// The chunk iCCP comes before the picture's (PNG specification, section 11.3.2.3).
-bool png_has_profile(std::istream& stream) {
+// Calls `take` with the type of every chunk before the picture's, the stream being at its content,
+// until it returns true (PNG specification, section 5.3).
+template <class Take>
+void walk_png(std::istream& stream, const Take& take) {
   stream.seekg(8);
   while (const auto length = big_endian(stream, 4)) {
     const std::string type = text(stream, 4);
-    if (type == "iCCP") return true;
-    if (type == "IDAT") return false;
-    stream.seekg(std::streamoff{*length} + 4, std::ios::cur);
+    if (type == "IDAT") return;
+    const auto content = stream.tellg();
+    if (take(type)) return;
+    stream.seekg(content + (std::streamoff{*length} + 4));
   }
-  return false;
+}
+
+// PNG specification, section 11.3.2.3.
+bool png_has_profile(std::istream& stream) {
+  bool found = false;
+  walk_png(stream, [&](const std::string& type) {
+    found = type == "iCCP";
+    return found;
+  });
+  return found;
 }
 
 }  // namespace
@@ -160,6 +172,37 @@ bool may_have_profile(const std::filesystem::path& path, std::string_view format
   if (format == "png") return png_has_profile(stream);
   if (format == "jpeg") return jpeg_has_profile(stream);
   return true;
+}
+
+bool may_be_transparent(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  const std::string magic = text(stream, 12);
+  const std::string_view format = format_of(magic);
+  if (format == "jpeg" || format == "hdr") return false;
+  if (format != "png") return true;
+  constexpr int kAlpha = 4;  // a bit of the colour type (PNG specification, section 11.2.2)
+  stream.seekg(25);
+  bool found = (stream.get() & kAlpha) != 0;
+  walk_png(stream, [&](const std::string& type) {
+    found = found || type == "tRNS";
+    return found;
+  });
+  return found;
+}
+
+std::optional<double> png_gamma(const std::filesystem::path& path) {
+  constexpr double kUnits = 100000;  // PNG specification, section 11.3.2.2
+  std::ifstream stream(path, std::ios::binary);
+  if (format_of(text(stream, 8)) != "png") return std::nullopt;
+  std::optional<unsigned> gamma;
+  bool overruled = false;
+  walk_png(stream, [&](const std::string& type) {
+    if (type == "gAMA") gamma = big_endian(stream, 4);
+    overruled = type == "iCCP" || type == "sRGB" || type == "cICP";
+    return overruled;
+  });
+  if (overruled || gamma.value_or(0) == 0) return std::nullopt;
+  return *gamma / kUnits;
 }
 
 }  // namespace raysplats::io

@@ -25,4 +25,12 @@ std::optional<ImageSize> size_in_header(const std::filesystem::path& path, std::
 /// formats yes.
 bool may_have_profile(const std::filesystem::path& path, std::string_view format);
 
+/// Whether a file may have transparent pixels: not JPEG and HDR, of PNG what the header says, any
+/// other.
+bool may_be_transparent(const std::filesystem::path& path);
+
+/// The exponent that made the numbers of a PNG of light, about 0.45 of display values, where its
+/// chunk gAMA alone says it; nothing for other files, and where a profile or sRGB goes before it.
+std::optional<double> png_gamma(const std::filesystem::path& path);
+
 }  // namespace raysplats::io

@@ -182,7 +182,7 @@ void write_model(const std::filesystem::path& path,
   check_gaussians(model);
   switch (format) {
     case io::ModelFormat::kPly:
-      return write_ply(path, model, trace, origin);
+      return io::write_ply_as_it_is(path, model, trace, origin);
     case io::ModelFormat::kCompressedPly:
       return io::write_compressed_ply(path, model);
     case io::ModelFormat::kSplat:

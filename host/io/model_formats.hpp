@@ -37,6 +37,13 @@ void write_spz(const std::filesystem::path& path,
                int version,
                SpzAxes axes);
 
+/// write_ply() without its look at the numbers: what a run that diverged has learnt is kept, and is
+/// refused when it is read. Throws UsageError where the arrays do not fit each other.
+void write_ply_as_it_is(const std::filesystem::path& path,
+                        const Gaussians& model,
+                        const std::optional<TraceOptions>& trace,
+                        const std::array<double, 3>& origin);
+
 /// glTF 2.0, JSON or GLB, with KHR_gaussian_splatting (Khronos, release candidate of 2026): all
 /// Gaussians of its scene, turned from y up to the y down of captures.
 Gaussians read_gltf_gaussians(const std::filesystem::path& path, bool drop_nonfinite = false);

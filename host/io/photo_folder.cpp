@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 
 #include "io/find_image.hpp"
 #include "io/image_file.hpp"
@@ -64,7 +65,70 @@ std::optional<fs::path> other_folder(const fs::path& root, const ColmapModel& mo
   return std::nullopt;
 }
 
+std::size_t photos_in(const fs::path& folder, const ColmapModel& model) {
+  const auto is_there = [&](const ColmapImage& image) {
+    return find_photo(folder, image.name) || find_respelt(folder, image.name);
+  };
+  return static_cast<std::size_t>(
+      std::count_if(model.images.begin(), model.images.end(), is_there));
+}
+
+/// Looks at the first photo: warns where it is not as much smaller than that in `images`, or than
+/// its camera where there is none, as the name of its folder says.
+void warn_of_size(const PhotoFolder& copies, const fs::path& images, const ColmapModel& model) {
+  constexpr double kMostOff = 0.1;
+  for (const ColmapImage& image : model.images) {
+    const auto photo = find_photo(copies.path, image.name);
+    if (!photo) continue;
+    const Camera& camera = model.cameras.at(image.camera_id);
+    const auto whole = find_photo(images, image.name);
+    const ImageSize size = image_size(*photo);
+    const ImageSize full = whole ? image_size(*whole) : ImageSize{camera.width, camera.height};
+    // Either may be turned by a quarter.
+    const double factor =
+        static_cast<double>(std::max(full.width, full.height)) / std::max(size.width, size.height);
+    if (std::abs(factor / copies.factor - 1) <= kMostOff) return;
+    spdlog::warn(
+        "The photos in {} are {:.3g} times smaller than {} ({} x {} of {} x {} pixels, the first), "
+        "not {} times as the name of their folder says",
+        copies.path.string(), factor, whole ? "those in images" : "the cameras of the model",
+        size.width, size.height, full.width, full.height, copies.factor);
+    return;
+  }
+}
+
+/// Reduced copies, or `images` in the place of those that lack photos which it has.
+PhotoFolder fuller_copies(const PhotoFolder& copies,
+                          const fs::path& images,
+                          const ColmapModel& model) {
+  const std::size_t reduced = photos_in(copies.path, model), whole = photos_in(images, model);
+  if (reduced >= whole) {
+    warn_of_size(copies, images, model);
+    return copies;
+  }
+  spdlog::warn("{} has {} of the {} photos of the model and {} has {}: those in images are used",
+               copies.path.string(), reduced, model.images.size(), images.string(), whole);
+  return {images, 1.0};
+}
+
 }  // namespace
+
+std::optional<PhotoFolder> reduced_copies(const fs::path& root, double downscale) {
+  const auto reduced = [&](int factor) { return root / fmt::format("images_{}", factor); };
+  if (downscale > 1 && downscale <= 1024 && downscale == std::floor(downscale) &&
+      is_folder(reduced(static_cast<int>(downscale)))) {
+    return PhotoFolder{reduced(static_cast<int>(downscale)), downscale};
+  }
+  if (is_folder(root / "images")) return std::nullopt;
+  std::optional<PhotoFolder> chosen;
+  for (const int factor : {2, 4, 8}) {
+    // The most reduced copy that is large enough, or else the largest copy.
+    if (is_folder(reduced(factor)) && (!chosen || factor <= downscale)) {
+      chosen = PhotoFolder{reduced(factor), static_cast<double>(factor)};
+    }
+  }
+  return chosen;
+}
 
 std::optional<fs::path> find_photo(const fs::path& folder, const fs::path& name) {
   for (const fs::path& candidate : {name, name.filename()}) {
@@ -77,27 +141,15 @@ std::optional<fs::path> find_photo(const fs::path& folder, const fs::path& name)
 }
 
 PhotoFolder usual_photo_folder(const fs::path& root, double downscale) {
-  const auto reduced = [&](int factor) { return root / fmt::format("images_{}", factor); };
-  if (downscale > 1 && downscale <= 1024 && downscale == std::floor(downscale) &&
-      is_folder(reduced(static_cast<int>(downscale)))) {
-    return {reduced(static_cast<int>(downscale)), downscale};
-  }
-  if (is_folder(root / "images")) return {root / "images", 1.0};
-  std::optional<PhotoFolder> chosen;
-  for (const int factor : {2, 4, 8}) {
-    // The most reduced copy that is large enough, or else the largest copy.
-    if (is_folder(reduced(factor)) && (!chosen || factor <= downscale)) {
-      chosen = PhotoFolder{reduced(factor), static_cast<double>(factor)};
-    }
-  }
+  const std::optional<PhotoFolder> chosen = reduced_copies(root, downscale);
   if (!chosen) {
-    // Photos beside the model, for example when their names in the model include a folder.
-    return {root, 1.0};
+    // Photos may be beside the model, for example when their names in the model include a folder.
+    return {is_folder(root / "images") ? root / "images" : root, 1.0};
   }
   if (chosen->factor > downscale) {
     spdlog::info("{} has no folder images: {} is used at its own size, as with --downscale {}",
                  root.string(), chosen->path.filename().string(), chosen->factor);
-  } else {
+  } else if (chosen->factor < downscale) {
     spdlog::info("{} has no folder images: {} is used", root.string(),
                  chosen->path.filename().string());
   }
@@ -117,7 +169,7 @@ PhotoFolder photo_folder(const fs::path& root, const ColmapModel& model, double 
                  usual.path.string(), found->string());
     return {*found, 1.0};
   }
-  if (!found) return usual;
+  if (!found) return usual.factor > 1 ? fuller_copies(usual, images, model) : usual;
   spdlog::info("the photos of the model are those in {}", found->string());
   return {*found, 1.0};
 }

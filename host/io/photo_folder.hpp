@@ -18,13 +18,17 @@ struct PhotoFolder {
 /// `downscale` or are all there is, `images`, or `root` itself.
 PhotoFolder usual_photo_folder(const std::filesystem::path& root, double downscale);
 
+/// usual_photo_folder() where it is one of reduced copies.
+std::optional<PhotoFolder> reduced_copies(const std::filesystem::path& root, double downscale);
+
 /// Where the photos of a COLMAP model below the data set `root` lie: as usual_photo_folder(),
 /// `root` being where they lie beside the model. The photos that convert.py
 /// of 3DGS reads lie in `input`, and those that it makes of them, which are of another size and
 /// without a lens, in `images`: the model tells which are its own. Where neither is there, a folder
 /// that other programs name (Images, rgb, resized_images of ScanNet++) and that has the model's
 /// first photo. Where the usual folder has none of the photos (reduced copies of other names), but
-/// `images` or the root has: that.
+/// `images` or the root has: that. Reduced copies that lack photos of `images` are not taken, and
+/// those of another size than their folder says are warned of.
 PhotoFolder photo_folder(const std::filesystem::path& root,
                          const ColmapModel& model,
                          double downscale);

@@ -5,21 +5,22 @@
 #include <bitset>
 #include <cstddef>
 #include <cstdint>
-#include <string>
+#include <set>
 #include <type_traits>
 #include <variant>
 #include <vector>
 
 #include "io/image_file.hpp"
+#include "io/image_header.hpp"
 #include "raysplats/error.hpp"
 #include "scene/even_choice.hpp"
-#include "util/path_text.hpp"
 
 namespace raysplats::io {
 namespace {
 
 constexpr std::size_t kPhotos = 5;
-constexpr std::size_t kSide = 64;  // of the grid of pixels that are looked at
+constexpr std::size_t kPhotosInDoubt = 20;  // a multiple, so that the five are among them
+constexpr std::size_t kSide = 64;           // of the grid of pixels that are looked at
 constexpr std::size_t kPlaces = kSide * kSide;
 constexpr double kOpaque = 0.9;
 // Shares of the places: a photo with fewer is opaque, a border has no more, and is as much the
@@ -59,10 +60,6 @@ Places transparent_places(const RawImage& photo) {
 }
 
 Places transparent_places(const View& view) {
-  const std::string extension = lower_extension(view.image_path);
-  for (const char* opaque : {".jpg", ".jpeg", ".jfif", ".hdr"}) {
-    if (extension == opaque) return {};
-  }
   try {
     return transparent_places(read_raw_image(view.image_path));
   } catch (const Error&) {
@@ -72,19 +69,33 @@ Places transparent_places(const View& view) {
 
 }  // namespace
 
-Transparency transparency(std::span<const View> views) {
-  const std::vector<std::size_t> chosen = even_choice(views.size(), kPhotos);
-  std::vector<Places> photos;
-  for (const std::size_t i : chosen) {
-    const Places places = transparent_places(views[i]);
-    if (share(places) >= kFew) photos.push_back(places);
+TransparentPhotos transparency(std::span<const View> views) {
+  // No picture is decoded of a file that says it is opaque.
+  std::vector<std::size_t> candidates;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (may_be_transparent(views[i].image_path)) candidates.push_back(i);
   }
-  if (2 * photos.size() <= chosen.size()) return Transparency::kNone;
+  std::set<std::size_t> looked_at;
+  std::vector<Places> photos;
+  for (const std::size_t most : {kPhotos, kPhotosInDoubt}) {
+    for (const std::size_t i : even_choice(candidates.size(), most)) {
+      if (!looked_at.insert(i).second) continue;
+      const Places places = transparent_places(views[candidates[i]]);
+      if (share(places) >= kFew) photos.push_back(places);
+    }
+    if (photos.empty() || photos.size() == looked_at.size()) break;
+  }
+  TransparentPhotos out;
+  if (photos.empty()) return out;
+  out.count = (photos.size() * candidates.size() + looked_at.size() / 2) / looked_at.size();
+  out.exact = looked_at.size() == candidates.size();
+  if (2 * out.count <= views.size()) return out;
   const bool border = std::all_of(photos.begin(), photos.end(), [&](const Places& places) {
     return share(places) <= kWidestBorder && share(places ^ photos.front()) <= kSame;
   });
   // One photo alone tells of no border that all have.
-  return border && photos.size() > 1 ? Transparency::kBorder : Transparency::kCutOut;
+  out.kind = border && photos.size() > 1 ? Transparency::kBorder : Transparency::kCutOut;
+  return out;
 }
 
 }  // namespace raysplats::io

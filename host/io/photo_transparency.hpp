@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <span>
 
 #include "raysplats/dataset.hpp"
@@ -14,7 +15,14 @@ enum class Transparency {
   kCutOut,  ///< what lies around a body that was cut out
 };
 
-/// Opens at most five photos whose format can be transparent; what cannot be read counts as opaque.
-Transparency transparency(std::span<const View> views);
+struct TransparentPhotos {
+  Transparency kind = Transparency::kNone;
+  std::size_t count = 0;  ///< of photos with something transparent
+  bool exact = true;      ///< else told by the share of those that were looked at
+};
+
+/// Decodes at most five photos whose files can be transparent, or twenty where these disagree; what
+/// cannot be read counts as opaque.
+TransparentPhotos transparency(std::span<const View> views);
 
 }  // namespace raysplats::io

@@ -58,11 +58,16 @@ void set_cameras(
   require_believable(view.source_camera,
                      fmt::format("The camera of the image {}", view.image_path.string()));
   view.sample_bytes = photo.sample_bytes;
-  view.camera = downscaled(rendered_camera(view.source_camera), factor);
-  if (undistort && view.camera.model == CameraModel::kOpenCv) {
-    view.camera.model = CameraModel::kPinhole;
-    view.camera.distortion = {};
+  view.camera = picture_camera(view.source_camera, factor, undistort);
+}
+
+Camera picture_camera(const Camera& photo, double factor, bool undistort) {
+  Camera out = downscaled(rendered_camera(photo), factor);
+  if (undistort && out.model == CameraModel::kOpenCv) {
+    out.model = CameraModel::kPinhole;
+    out.distortion = {};
   }
+  return out;
 }
 
 void leave_out_missing(std::size_t missing,
@@ -91,6 +96,23 @@ void warn_of_folding_lenses(const std::vector<View>& views) {
       "The lenses of {} of {} photos fold back well within the photo, which loses what is outside "
       "({:.0f} % of {}, the first): correct their distortion, or undistort the images first",
       folding, views.size(), 100 * first_lost, first.string());
+}
+
+void warn_of_principal_points(const std::vector<View>& views) {
+  constexpr double kFar = 0.2;  // of a side; of intrinsics of half the size it is a quarter
+  const auto is_far = [](const View& view) {
+    const Camera& photo = view.source_camera;
+    return std::abs(photo.cx / photo.width - 0.5) > kFar ||
+           std::abs(photo.cy / photo.height - 0.5) > kFar;
+  };
+  const auto far = std::count_if(views.begin(), views.end(), is_far);
+  if (2 * static_cast<std::size_t>(far) <= views.size()) return;
+  const Camera& first = std::find_if(views.begin(), views.end(), is_far)->source_camera;
+  spdlog::warn(
+      "The principal point of {} of {} photos is far from their middle (at {:.0f}, {:.0f} of {} x "
+      "{} pixels, the first): unless they are crops, their intrinsics belong to photos of another "
+      "size, which the cameras' file must say (w and h of a transforms file)",
+      far, views.size(), first.cx, first.cy, first.width, first.height);
 }
 
 void refuse_shared_photo(const std::string& first,

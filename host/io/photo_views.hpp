@@ -18,6 +18,10 @@ namespace raysplats::io {
 /// another shape.
 void set_cameras(View& view, const Camera& nominal, ImageSize photo, double factor, bool undistort);
 
+/// The camera of the picture that is made of a photo, whose camera with its lens is `photo`: of a
+/// size divided by `factor`, and with `undistort` a pinhole in the place of kOpenCv.
+Camera picture_camera(const Camera& photo, double factor, bool undistort);
+
 /// Poses without a photo, as those of blurred photos that were deleted, are left out with a
 /// warning; where most of `all` have none, it is the folder that is wrong: DataError with `advice`.
 void leave_out_missing(std::size_t missing,
@@ -28,6 +32,10 @@ void leave_out_missing(std::size_t missing,
 /// Warns once of photos of planes whose lens folds back (lens_limit()) within half of their smaller
 /// side: its polynomial does not fit the photo, most of which is lost.
 void warn_of_folding_lenses(const std::vector<View>& views);
+
+/// Warns once where the principal points of most photos are far from their middle or beside them:
+/// intrinsics of another size than the photos', unless they are crops.
+void warn_of_principal_points(const std::vector<View>& views);
 
 /// Throws DataError: two images of `cameras`, a file or model by its name, have one photo.
 [[noreturn]] void refuse_shared_photo(const std::string& first,

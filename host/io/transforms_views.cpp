@@ -5,6 +5,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
 #include <string>
@@ -25,8 +26,9 @@ namespace fs = std::filesystem;
 /// The photo of a frame.
 struct FramePhoto {
   fs::path path;
-  bool moved = false;    ///< found by the end of its name
-  bool respelt = false;  ///< in other letter case
+  bool moved = false;        ///< found by the end of its name
+  bool respelt = false;      ///< in other letter case
+  bool reformatted = false;  ///< with another extension
 };
 
 std::optional<FramePhoto> frame_photo(const TransformsFile& file, const TransformsFrame& frame) {
@@ -37,6 +39,8 @@ std::optional<FramePhoto> frame_photo(const TransformsFile& file, const Transfor
   if (auto photo = find_image(folder, frame.file_path)) return FramePhoto{*photo};
   if (auto photo = find_respelt(folder, frame.file_path)) return FramePhoto{*photo, false, true};
   if (auto photo = find_moved(folder, frame.file_path, 1)) return FramePhoto{*photo, true};
+  if (auto photo = find_reformatted(folder, frame.file_path))
+    return FramePhoto{*photo, false, false, true};
   return std::nullopt;
 }
 
@@ -57,13 +61,14 @@ std::map<fs::path, std::string> photos_in_place(
     const TransformsFile& file, const std::vector<std::optional<FramePhoto>>& photos) {
   std::map<fs::path, std::string> out;
   for (std::size_t i = 0; i < photos.size(); ++i) {
-    if (photos[i] && !photos[i]->moved) out.emplace(photos[i]->path, file.frames[i].file_path);
+    if (photos[i] && !photos[i]->moved && !photos[i]->reformatted)
+      out.emplace(photos[i]->path, file.frames[i].file_path);
   }
   return out;
 }
 
 /// The photos of a file's frames; frames without one leave the file. A photo that is where another
-/// frame says is none that was moved: that of a frame which finds no other is missing.
+/// frame says is none that was moved or converted: that of a frame which finds no other is missing.
 std::vector<FramePhoto> frame_photos(TransformsFile& file) {
   std::vector<FramePhoto> photos;
   std::vector<TransformsFrame> found, missing;
@@ -73,6 +78,7 @@ std::vector<FramePhoto> frame_photos(TransformsFile& file) {
   for (std::size_t i = 0; i < hits.size(); ++i) {
     TransformsFrame& frame = file.frames[i];
     std::optional<FramePhoto>& photo = hits[i];
+    if (photo && photo->reformatted && in_place.contains(photo->path)) photo.reset();
     if (photo && photo->moved) {
       const auto owner = in_place.find(photo->path);
       if (owner != in_place.end() && !may_be_same(owner->second, frame.file_path)) photo.reset();
@@ -93,6 +99,27 @@ std::vector<FramePhoto> frame_photos(TransformsFile& file) {
   leave_out_missing(missing.size(), missing.size() + photos.size(), what,
                     "put them where file_path says, counted from the file's folder");
   return photos;
+}
+
+/// The focal length across that the angle of a frame says, in pixels of its camera, where the
+/// camera has clearly another one; 0 otherwise. Angles are those of planes alone.
+double other_focal_length(const TransformsFrame& frame, const Camera& camera) {
+  constexpr double kClearly = 1.2;
+  if (!frame.fx || !frame.angle_x || frame.model != CameraModel::kPinhole) return 0;
+  const double focal = 0.5 * camera.width / std::tan(0.5 * *frame.angle_x);
+  return std::max(focal, camera.fx) > kClearly * std::min(focal, camera.fx) ? focal : 0;
+}
+
+/// Of a file in which `contradicting` of all frames have two focal lengths.
+void warn_of_angles(const TransformsFile& file,
+                    std::size_t contradicting,
+                    double focal,
+                    double angle_focal) {
+  if (contradicting == 0) return;
+  spdlog::warn(
+      "{}: fl_x and camera_angle_x contradict each other in {} of {} frames ({:.0f} and {:.0f} "
+      "pixels, the first): fl_x counts, which may be of photos of another size (w and h say it)",
+      file.path.string(), contradicting, file.frames.size(), focal, angle_focal);
 }
 
 /// The mask or depth map `path` of a frame. Its folder tells it from the photo of the same name.
@@ -130,8 +157,9 @@ std::vector<View> transforms_views(TransformsFile& file,
   const fs::path folder = file.path.parent_path();
   const std::vector<FramePhoto> photos = frame_photos(file);
   std::vector<View> views;
-  std::size_t moved = 0, respelt = 0;
-  std::string first_moved, first_respelt;
+  std::size_t moved = 0, respelt = 0, reformatted = 0, contradicting = 0;
+  std::string first_moved, first_respelt, first_reformatted;
+  double first_focal = 0, first_angle_focal = 0;
   for (std::size_t i = 0; i < file.frames.size(); ++i) {
     const TransformsFrame& frame = file.frames[i];
     const fs::path& photo = photos[i].path;
@@ -143,6 +171,7 @@ std::vector<View> transforms_views(TransformsFile& file,
       if (moved++ == 0) first_moved = frame.file_path;
     }
     if (photos[i].respelt && respelt++ == 0) first_respelt = frame.file_path;
+    if (photos[i].reformatted && reformatted++ == 0) first_reformatted = frame.file_path;
     if (!has_image_extension(name)) name += photo.extension();
     view.mask_path = frame.mask_path.empty() ? masks.find(name, photo)
                                              : named_by(file, frame, "mask", frame.mask_path);
@@ -152,12 +181,22 @@ std::vector<View> transforms_views(TransformsFile& file,
     Camera nominal =
         frame_camera(file, i, frame.width.value_or(size.width), frame.height.value_or(size.height));
     nominal.name = inner_name(name);
+    if (const double focal = other_focal_length(frame, nominal);
+        focal > 0 && contradicting++ == 0) {
+      first_focal = nominal.fx;
+      first_angle_focal = focal;
+    }
     set_cameras(view, nominal, size, options.downscale, options.undistort);
     views.push_back(std::move(view));
   }
+  warn_of_angles(file, contradicting, first_focal, first_angle_focal);
   if (moved > 0) {
     spdlog::info("{} of {} photos are not where {} says ({}) but were found below its folder",
                  moved, views.size(), file.path.string(), first_moved);
+  }
+  if (reformatted > 0) {
+    spdlog::info("{} of {} photos have another extension than {} says ('{}')", reformatted,
+                 views.size(), file.path.string(), first_reformatted);
   }
   tell_of_case(respelt, views.size(), file.path, first_respelt);
   return views;

@@ -4,6 +4,7 @@
 
 #include "io/view_rows.hpp"
 #include "raysplats/dataset.hpp"
+#include "scene/image_check.hpp"
 
 namespace raysplats {
 
@@ -24,6 +25,7 @@ ViewPicture load_view_picture(const View& view) {
 }
 
 Image composite(const Image& rgba, const float background[3]) {
+  check_image(rgba, "The picture that is composited");
   Image out(rgba.width, rgba.height, 3);
   const auto channels = static_cast<std::size_t>(rgba.channels);
   const bool grey = channels < 3;

@@ -15,7 +15,6 @@
 namespace raysplats {
 namespace {
 
-constexpr std::size_t kMostViews = 64;
 constexpr double kMostPixels = 6e5;  // of a view
 
 /// Without what hides the gradient of a colour: all are 0.5, which no bound meets.
@@ -39,7 +38,7 @@ std::vector<double> contributions(Context& context,
   trace.depth = false;
   const Model on_device(context, in_grey(model));
   Tracer tracer(context, trace, mirrors);
-  const std::vector<std::size_t> views = even_choice(cameras.size(), kMostViews);
+  const std::vector<std::size_t> views = even_choice(cameras.size(), kMostContributionViews);
   std::vector<double> out(model.size());
   for (const std::size_t v : views) {
     const Camera& view = cameras[v];

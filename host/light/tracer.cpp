@@ -31,24 +31,28 @@ constexpr std::size_t kLeastBatch = 4096;
 static_assert(sizeof(RayResultGradient) == sizeof(RayBackward::ResultGradient));
 
 // Where the square leaves single precision, kernels let a ray meet nothing.
-constexpr float kLongestDirection = 1e19f;
+constexpr float kLongestVector = 1e19f;
 
 bool finite(const float (&v)[3]) {
   return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
 }
 
+float square(const float (&v)[3]) { return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]; }
+
 // As the kernels take it: an infinite end is the largest number.
 Ray checked(const Ray& ray, std::size_t number) {
   const float* d = ray.direction;
-  const float squares = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+  const float squares = square(ray.direction);
   const char* fault = nullptr;
   if (!finite(ray.origin) || !finite(ray.direction) || std::isnan(ray.t_max) ||
       !std::isfinite(ray.t_min)) {
     fault = "has a number that is not finite";
   } else if (!(squares >= std::numeric_limits<float>::min())) {
     fault = "has a direction of length 0";
-  } else if (!(squares <= kLongestDirection * kLongestDirection)) {
+  } else if (!(squares <= kLongestVector * kLongestVector)) {
     fault = "has a direction whose length is beyond 1e19";
+  } else if (!(square(ray.origin) <= kLongestVector * kLongestVector)) {
+    fault = "has an origin farther than 1e19 from 0";
   } else if (!(ray.t_min >= 0.0f)) {
     fault = "begins before its origin";
   } else if (ray.t_min > ray.t_max) {

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "io/image_codec.hpp"
+#include "raysplats/error.hpp"
 #include "raysplats/image.hpp"
 #include "raysplats/io.hpp"
 #include "report/html.hpp"
@@ -99,17 +101,28 @@ std::vector<Bytes> fitting(const std::vector<Image>& images) {
 
 std::string figures(std::span<const Figure> figures) {
   std::vector<Image> images;
+  std::vector<std::string> lacks;  // why a figure has no image, "" for one that has
   for (const Figure& figure : figures) {
-    // Large ones are let go one by one.
-    if (!figure.file.empty()) images.push_back(shrunk(read_image(figure.file), kGrades[0].side));
+    std::string& lack = lacks.emplace_back();
+    if (figure.file.empty()) {
+      lack = "the run wrote no picture of it (--eval-renders)";
+      continue;
+    }
+    try {
+      // Large ones are let go one by one.
+      images.push_back(shrunk(read_image(figure.file), kGrades[0].side));
+    } catch (const DataError& error) {
+      lack = error.what();
+    }
   }
   const std::vector<Bytes> bytes = fitting(images);
   std::string out;
   auto next = bytes.begin();
+  auto lack = lacks.begin();
   for (const Figure& figure : figures) {
-    const std::string caption = escaped(figure.caption);
-    if (figure.file.empty()) {
-      out += fmt::format("<p>{}: the run wrote no picture of it (--eval-renders).</p>\n", caption);
+    const std::string caption = escaped(figure.caption), why = escaped(*lack++);
+    if (!why.empty()) {
+      out += fmt::format("<p>{}: {}.</p>\n", caption, why);
       continue;
     }
     out += fmt::format(

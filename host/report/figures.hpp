@@ -15,7 +15,7 @@ struct Figure {
 
 /// Figures as HTML. However large their files are, all pictures of a call take some 2 MB of the
 /// page: panels have at most 480 pixels a side, and less, at a lower quality, where many or noisy
-/// ones ask for more. Throws DataError for a picture that cannot be read.
+/// ones ask for more. For a picture that cannot be read the reason stands in its place.
 std::string figures(std::span<const Figure> figures);
 
 }  // namespace raysplats::report

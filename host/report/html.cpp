@@ -14,7 +14,7 @@ constexpr const char* kStyle = R"(
 :root{color-scheme:light dark;--text:#1d1d1b;--line:#d5d5d0;--warn:#9c3a1a;--c0:#1d5fa8;--c1:#c2561b;--c2:#2c7d3c;--c3:#8a3fa0;--c4:#8a6d14;--c5:#b02358}
 @media screen and (prefers-color-scheme:dark){:root{--text:#e6e6e3;--line:#3c3e42;--warn:#f0906a;--c0:#7db4ee;--c1:#f0a15e;--c2:#7fd08f;--c3:#cf93e6;--c4:#d9bd5c;--c5:#f288ab}body{background:#1c1d1f}}
 body{max-width:1000px;margin:24px auto;padding:0 16px;color:var(--text);font:15px/1.5 system-ui,sans-serif}
-h1{font-size:22px}h2{font-size:17px;margin-top:28px;border-top:1px solid var(--line);padding-top:10px}
+h1,p,figcaption{overflow-wrap:anywhere}h1{font-size:22px}h2{font-size:17px;margin-top:28px;border-top:1px solid var(--line);padding-top:10px}
 .warn{color:var(--warn)}.charts{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(380px,100%),1fr));gap:12px}
 svg{width:100%;height:auto;overflow:visible}svg text{fill:currentColor;font-size:11px}svg .title{font-size:13px;font-weight:600}
 svg line{stroke:var(--line)}polyline{fill:none;stroke-width:1.6}

@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
+#include <system_error>
+#include <utility>
 #include <vector>
 
 #include "io/json_file.hpp"
@@ -155,9 +157,9 @@ std::string kernels(const Json& metrics) {
   }
   if (rows.empty()) return "<p>The run was too short for one of its steps to be timed.</p>\n";
   const double steps = number(metrics, "timed_steps");
-  const std::string what =
-      steps > 0 ? fmt::format("Device time in {:.0f} steps of training, one of every 32", steps)
-                : "Device time of the whole run";
+  const std::string what = steps > 0 ? fmt::format("Device time in {} of training, one of every 32",
+                                                   counted(steps, "step"))
+                                     : "Device time of the whole run";
   return "<p>" + what +
          ".</p>\n<table>\n<tr><th>kernel</th><th>launches</th><th>ms</th><th>share</th></tr>\n" +
          rows + "</table>\n";
@@ -192,16 +194,12 @@ std::string configuration(const fs::path& run) {
                      escaped(text));
 }
 
-}  // namespace
+struct Page {
+  std::string text;
+  std::vector<std::string> warnings;
+};
 
-std::vector<fs::path> report_inputs(const fs::path& run) {
-  std::vector<fs::path> files{run / "metrics.json", run / "metrics.csv", run / "config.toml",
-                              run / "cameras.json", run / "exposures.json"};
-  if (const fs::path model = newest_model(run); !model.empty()) files.push_back(model);
-  return files;
-}
-
-std::string run_report(const fs::path& run) {
+Page page_of(const fs::path& run) {
   const Json metrics = metrics_of(run);
   const std::vector<Json> evaluations = objects(metrics, "evaluations");
   const std::vector<Json> views = views_of(run, evaluations);
@@ -227,12 +225,12 @@ std::string run_report(const fs::path& run) {
   facts += row("Device memory",
                fmt::format("{:.0f} MiB at most", number(metrics, "peak_device_bytes") / 1048576.0));
   facts += origin(metrics);
-  const std::vector<std::string> warnings =
+  std::vector<std::string> warnings =
       warnings_of(metrics, settings(text_of(run / "config.toml")), columns, views);
   std::string said = fmt::format("<p>{}</p>\n", escaped(verdict(metrics, warnings.size())));
   for (const std::string& each : warnings)
     said += fmt::format("<p class=\"warn\">{}.</p>\n", escaped(each));
-  return report::page(
+  std::string text = report::page(
       run_name(run),
       said + "<table>\n" + facts + "</table>\n" + section("Curves", charts(columns, evaluations)) +
           section("Held-out views", held_out(run, evaluations, views)) +
@@ -240,10 +238,28 @@ std::string run_report(const fs::path& run) {
           section("Model", model_histograms(run)) + section("Exposure", exposures(run)) +
           section("Kernels", kernels(metrics)) +
           section("Settings that differ from the defaults", configuration(run)));
+  return {std::move(text), std::move(warnings)};
 }
 
-void write_run_report(const fs::path& run, const fs::path& file) {
-  write_text_file(file, run_report(run));
+}  // namespace
+
+std::vector<fs::path> report_inputs(const fs::path& run) {
+  std::vector<fs::path> files{run / "metrics.json", run / "metrics.csv", run / "config.toml",
+                              run / "cameras.json", run / "exposures.json"};
+  if (const fs::path model = newest_model(run); !model.empty()) files.push_back(model);
+  // Pictures have names that only metrics.json beside them knows, which may be damaged.
+  const fs::path evaluation = pictures_of(run, objects(metrics_of(run), "evaluations"));
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(evaluation, error)) files.push_back(entry.path());
+  return files;
+}
+
+std::string run_report(const fs::path& run) { return page_of(run).text; }
+
+std::string write_run_report(const fs::path& run, const fs::path& file) {
+  const Page page = page_of(run);
+  write_text_file(file, page.text);
+  return warnings_line(page.warnings, file);
 }
 
 }  // namespace raysplats

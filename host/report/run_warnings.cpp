@@ -169,6 +169,13 @@ std::string verdict(const Json& metrics, std::size_t warnings) {
                      warnings == 0 ? "nothing to warn of" : counted(warnings, "warning"));
 }
 
+std::string warnings_line(const std::vector<std::string>& warnings,
+                          const std::filesystem::path& file) {
+  if (warnings.empty()) return "";
+  return fmt::format("{} in {}{}: {}", counted(warnings.size(), "warning"), file.string(),
+                     warnings.size() > 1 ? ", the first" : "", warnings.front());
+}
+
 std::vector<std::string> warnings_of(const Json& metrics,
                                      const std::map<std::string, std::string>& settings,
                                      const std::map<std::string, std::vector<double>>& columns,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -20,5 +21,9 @@ std::vector<std::string> warnings_of(const nlohmann::json& metrics,
 /// The whole in one sentence: whether the run is over, how good its last evaluation was, and how
 /// many warnings follow.
 std::string verdict(const nlohmann::json& metrics, std::size_t warnings);
+
+/// For a console: how many warnings the page in `file` has, and the first; "" for none.
+std::string warnings_line(const std::vector<std::string>& warnings,
+                          const std::filesystem::path& file);
 
 }  // namespace raysplats::report

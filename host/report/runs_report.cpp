@@ -63,7 +63,8 @@ std::vector<Run> read_runs(const std::vector<fs::path>& folders) {
   return runs;
 }
 
-/// A row of a table with a cell for each run; the greatest of finite numbers stands out.
+/// A row of a table with a cell for each run, empty for one whose number is NaN; the greatest of
+/// the others stands out.
 std::string numbers_row(const std::string& what,
                         const std::vector<Run>& runs,
                         const char* format,
@@ -71,8 +72,11 @@ std::string numbers_row(const std::string& what,
                         bool greatest_wins = false) {
   std::vector<double> numbers;
   numbers.reserve(runs.size());
-  for (const Run& run : runs) numbers.push_back(value(run));
-  const double most = *std::max_element(numbers.begin(), numbers.end());
+  double most = std::nan("");
+  for (const Run& run : runs) {
+    numbers.push_back(value(run));
+    most = std::fmax(most, numbers.back());  // of NaN and a number the number
+  }
   std::string out = fmt::format("<tr><th>{}</th>", escaped(what));
   for (const double number : numbers) {
     const std::string text = std::isnan(number) ? "" : fmt::format(fmt::runtime(format), number);

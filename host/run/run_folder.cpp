@@ -3,14 +3,10 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <fstream>
-#include <memory>
-#include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
@@ -19,7 +15,9 @@
 #include <vector>
 
 #include "io/data_origin.hpp"
+#include "io/file_hash.hpp"
 #include "io/json_file.hpp"
+#include "io/model_formats.hpp"
 #include "io/transforms.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -167,7 +165,7 @@ void RunFolder::write_model(const Gaussians& model,
                             std::int64_t iteration,
                             const std::array<double, 3>& origin) const {
   if (!writes_) return;
-  write_ply(model_file(path_, iteration), model, trace, origin);
+  io::write_ply_as_it_is(model_file(path_, iteration), model, trace, origin);
 }
 
 bool RunFolder::has_model(std::int64_t iteration) const {
@@ -192,18 +190,7 @@ void RunFolder::remove_model(std::int64_t iteration) const {
 }
 
 std::string RunFolder::model_hash(std::int64_t iteration) const {
-  std::ifstream stream(model_file(path_, iteration), std::ios::binary);
-  if (!stream) return "";
-  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(),
-                                                                       &XXH3_freeState);
-  if (!state) throw std::bad_alloc();
-  XXH3_128bits_reset(state.get());
-  constexpr std::size_t kPart = std::size_t{1} << 20;
-  std::vector<char> part(kPart);
-  while (stream.read(part.data(), kPart) || stream.gcount() > 0)
-    XXH3_128bits_update(state.get(), part.data(), static_cast<std::size_t>(stream.gcount()));
-  const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
-  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+  return io::file_hash(model_file(path_, iteration)).value_or("");
 }
 
 void RunFolder::remove_after(std::int64_t iteration) const {

@@ -56,7 +56,8 @@ class RunFolder {
   /// set's files, whose `origin` was taken off.
   void write_refined_cameras(std::vector<Camera> cameras,
                              const std::array<double, 3>& origin) const;
-  /// `trace` goes into the header, for those who take the model elsewhere.
+  /// `trace` goes into the header, for those who take the model elsewhere. Numbers that are not
+  /// finite are kept: what a run that diverged has learnt is not to be lost.
   void write_model(const Gaussians& model,
                    const TraceOptions& trace,
                    std::int64_t iteration,

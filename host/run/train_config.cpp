@@ -363,8 +363,10 @@ void validate(const TrainOptions& options) {
         sum == GradientSum::kAtomic ? "atomic" : "swap"));
   }
   if (options.scale_max > 0 && options.scale_min > options.scale_max) {
-    throw UsageError(fmt::format("The option 'scale-min' = {} is above 'scale-max' = {}",
-                                 options.scale_min, options.scale_max));
+    throw UsageError(
+        fmt::format("The option 'scale-min' = {} is above 'scale-max' = {}: lower the one or raise "
+                    "the other",
+                    options.scale_min, options.scale_max));
   }
   if (options.poses && !options.mirrors.empty()) {
     throw UsageError(

@@ -23,6 +23,8 @@ using Values = OptionTable::Values;
 
 constexpr double kHuge = kNoBound;
 constexpr double kMaxCount = 1e15;
+// Extents of the scene. Far beyond, squares of scales leave single precision.
+constexpr double kMostScaleMin = 1e6;
 
 // A share of the run (below 1) or a whole number of iterations.
 RunShare parse_share(const std::string& key, const std::string& text, bool may_be_none) {
@@ -194,9 +196,10 @@ void add_data_options(TrainTable& t, TrainOptions& o) {
           "(trained, by direction; model files name it)");
   t.number("sky-degree", o.sky_degree, 0, 4,
            "degree of the spherical harmonics of a sky; 0 = one trained colour");
-  t.number("image-budget", o.image_budget, 0, 1e9,
-           "MiB of photos and depth maps kept on the device; the others are read again when their "
-           "turn comes");
+  t.number(
+      "image-budget", o.image_budget, 0, 1e9,
+      "MiB of photos and depth maps kept on the device, and of test photos beside it as far as "
+      "those leave room; the others are read again when their turn comes");
   t.resolutions(
       "resolution-schedule", o.resolution_schedule,
       "\"divisor:until\" pairs: photos are reduced by the divisor until that share of the "
@@ -392,7 +395,7 @@ void add_density_options(TrainTable& t, TrainOptions& o) {
   t.number("footprint", o.footprint, 0, 10,
            "least standard deviation of a Gaussian, in pixels of the view that resolves it best; 0 "
            "= none");
-  t.number("scale-min", o.scale_min, 0, kHuge,
+  t.number("scale-min", o.scale_min, 0, kMostScaleMin,
            "least standard deviation after every step, times the scene extent; 0 = none");
   t.number("scale-max", o.scale_max, 0, kHuge,
            "greatest standard deviation after every step, times the scene extent; 0 = none");

@@ -53,10 +53,19 @@ Camera look_at(const glm::dvec3& eye,
                int width,
                int height,
                double focal) {
-  const glm::dvec3 forward = glm::normalize(target - eye);
+  const glm::dvec3 view = target - eye;
+  const double upwards = glm::length(up);
+  // Also where a square leaves double precision.
+  if (!std::isnormal(glm::dot(view, view)) || !std::isfinite(upwards)) {
+    throw UsageError(fmt::format(
+        "A camera at ({}, {}, {}) cannot look at ({}, {}, {}) with ({}, {}, {}) upwards: give "
+        "finite numbers and a target apart from the camera",
+        eye.x, eye.y, eye.z, target.x, target.y, target.z, up.x, up.y, up.z));
+  }
+  const glm::dvec3 forward = glm::normalize(view);
   glm::dvec3 right = glm::cross(forward, up);
   // Looking along `up` leaves the roll open: any perpendicular will do.
-  if (glm::length(right) < 1e-9) {
+  if (glm::length(right) <= 1e-9 * upwards) {
     right =
         glm::cross(forward, std::abs(forward.x) < 0.9 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0));
   }

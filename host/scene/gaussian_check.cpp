@@ -19,12 +19,14 @@ void check_size(const char* name, const std::vector<float>& values, std::size_t 
       values.size(), name, expected));
 }
 
-void check_finite(const char* name, const std::vector<float>& values) {
+void check_finite(const char* name, const std::vector<float>& values, std::size_t gaussians) {
   const auto bad =
       std::find_if(values.begin(), values.end(), [](float value) { return !std::isfinite(value); });
   if (bad == values.end()) return;
-  throw DataError(fmt::format("Number {} of the Gaussians' {} is not finite: remove or mend it",
-                              bad - values.begin(), name));
+  const auto number = static_cast<std::size_t>(bad - values.begin());
+  throw DataError(
+      fmt::format("Gaussian {} has a number of '{}' that is not finite: remove or mend it",
+                  number / (values.size() / gaussians), name));
 }
 
 // Kernels normalise rotations in single precision, where squares have to be numbers.
@@ -65,11 +67,11 @@ void check_sizes(const Gaussians& gaussians) {
 
 void check_gaussians(const Gaussians& gaussians) {
   check_sizes(gaussians);
-  check_finite("means", gaussians.means);
-  check_finite("quaternions", gaussians.quaternions);
-  check_finite("log_scales", gaussians.log_scales);
-  check_finite("opacities", gaussians.opacities);
-  check_finite("sh", gaussians.sh);
+  check_finite("means", gaussians.means, gaussians.size());
+  check_finite("quaternions", gaussians.quaternions, gaussians.size());
+  check_finite("log_scales", gaussians.log_scales, gaussians.size());
+  check_finite("opacities", gaussians.opacities, gaussians.size());
+  check_finite("sh", gaussians.sh, gaussians.size());
   check_lengths(gaussians.quaternions);
 }
 

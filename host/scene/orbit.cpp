@@ -61,11 +61,7 @@ void check(const OrbitOptions& options) {
     throw UsageError(fmt::format("An orbit at distance {} has no eye: choose a positive number",
                                  options.distance));
   }
-  const double length = glm::length(options.up);
-  if (!(length > 0.0) || !std::isfinite(length)) {
-    throw UsageError(
-        "The up direction of the orbit has no length: give three numbers that are not all zero");
-  }
+  check_up(options.up);
 }
 
 // Standard deviation of a Gaussian along a direction, the largest of its three for none; 0 for one
@@ -131,7 +127,17 @@ glm::dvec3 estimate_up(std::span<const Camera> cameras) {
   return length > least && std::isfinite(length) ? sum / length : glm::dvec3(0.0, -1.0, 0.0);
 }
 
+void check_up(const glm::dvec3& up) {
+  const double length = glm::length(up);
+  if (!(length > 0.0) || !std::isfinite(length)) {
+    throw UsageError("The up direction has no length: give three numbers that are not all zero");
+  }
+}
+
 double field_of_view(const Camera& camera, CameraModel as) {
+  // Panoramas and parallel rays have no focal length.
+  if (camera.model == CameraModel::kEquirectangular || camera.model == CameraModel::kOrthographic)
+    return OrbitOptions().fov_degrees;
   const bool portrait = camera.width < camera.height;
   const double half = 0.5 * (portrait ? camera.width : camera.height);
   double angle = std::atan(half / (portrait ? camera.fx : camera.fy));

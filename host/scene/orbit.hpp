@@ -32,8 +32,12 @@ glm::dvec3 estimate_up(std::span<const Camera> cameras);
 
 /// Field of view along the smaller image side that a camera of the model `as` takes from this one,
 /// in degrees: of a fisheye from a fisheye what its lens sees there, up to its limit, else that of
-/// a pinhole with its focal length.
+/// a pinhole with its focal length. From a panorama or parallel rays, which have none, the one that
+/// orbits have without photos.
 double field_of_view(const Camera& camera, CameraModel as);
+
+/// Throws UsageError for a direction that is none.
+void check_up(const glm::dvec3& up);
 
 struct OrbitOptions {
   int frames = 60;

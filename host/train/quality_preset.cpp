@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
+#include "scene/pixel_count.hpp"
 #include "scene/statistics.hpp"
 #include "train/schedule.hpp"
 
@@ -34,12 +35,14 @@ constexpr double kSideOfSecond = 100;  // on CPUs; steps cost as pixels do
 constexpr double kLeastSide = 640;     // that a short time makes of it
 constexpr double kLeastDownscale = 1.25;
 
-// Of the usual photo to train on: a panorama among phone photos must not shrink them all.
+// Longest side of the usual photo to train on: a panorama among phone photos must not shrink them
+// all. That of a strip is one of as many pixels of the shape 2:1, since steps cost as pixels do.
 int longest_side(const Dataset& dataset) {
   std::vector<double> sides;
   for (const std::size_t i : dataset.indices(Split::kTrain)) {
     const Camera& camera = dataset.views[i].camera;
-    sides.push_back(std::max(camera.width, camera.height));
+    const double side = std::max(camera.width, camera.height);
+    sides.push_back(std::min(side, std::sqrt(2.0 * static_cast<double>(pixel_count(camera)))));
   }
   return sides.empty() ? 1 : std::max(1, static_cast<int>(median(std::move(sides))));
 }

@@ -28,12 +28,13 @@ struct QualityChoice {
 
 /// `dataset` at its full size. Iterations are passes over the training photos within limits, the
 /// lower of which gives way to what few photos ask for (run_length()); photos are reduced as the
-/// median one of their longest sides asks for, which may be half as long on CPUs as elsewhere.
+/// median one of their longest sides asks for, which may be half as long on CPUs as elsewhere. Of a
+/// strip the longest side is that of as many pixels in the shape 2:1.
 QualityChoice choose_quality(Quality quality, const Dataset& dataset, DeviceType device);
 
 /// By what the sizes of photos are divided where nobody says. The longer side of the usual photo of
-/// `dataset`, which is at its full size, is reduced to 1600 pixels, as in 3DGS; of a run of so many
-/// `seconds` to fewer, so that it sees each photo more than once. 1 where that is little less.
+/// `dataset`, as above and at its full size, is reduced to 1600 pixels, as in 3DGS; of a run of so
+/// many `seconds` to fewer, so that it sees each photo more than once. 1 where that is little less.
 double fitting_downscale(const Dataset& dataset,
                          DeviceType device,
                          std::optional<double> seconds = std::nullopt);

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <span>
 #include <utility>
 
@@ -13,6 +14,7 @@
 #include "run/mirror_meshes.hpp"
 #include "run/train_config.hpp"
 #include "run/train_option_table.hpp"
+#include "trace/memory_shares.hpp"
 #include "train/ignored_photos.hpp"
 #include "train/memory_estimate.hpp"
 #include "train/step_options.hpp"
@@ -30,23 +32,23 @@ std::vector<View> views_of(const Dataset& dataset, const std::vector<std::size_t
 }
 
 // What photos and depth maps may take of the device: all of them if there is room, else parts in
-// the proportion of what they would.
+// the proportion of what they would. What both leave is for the photos of evaluations.
 struct PictureBudget {
-  std::size_t photos, depths;
+  std::size_t photos, depths, left;
 
   static PictureBudget of(const TrainOptions& options,
                           const Dataset& dataset,
                           std::span<const std::size_t> views) {
     const std::size_t budget = static_cast<std::size_t>(options.image_budget) * kMiB;
-    if (options.depth_weight <= 0) return {budget, 0};
     std::size_t photos = 0;
     for (const std::size_t view : views) photos += io::photo_bytes(dataset.views[view]);
-    std::size_t maps = depth_map_bytes(dataset, views);
+    std::size_t maps = options.depth_weight > 0 ? depth_map_bytes(dataset, views) : 0;
+    const std::size_t left = budget - std::min(budget, photos + maps);
     if (photos + maps > budget) {
       maps = static_cast<std::size_t>(static_cast<double>(budget) * static_cast<double>(maps) /
                                       static_cast<double>(photos + maps));
     }
-    return {budget - maps, maps};
+    return {budget - maps, maps, left};
   }
 };
 
@@ -125,6 +127,22 @@ Trainer::Impl::Impl(Context& device,
         "on: keep fewer apart",
         options.validate_views, kLeastTrained, train_views.size()));
   }
+}
+
+// The photo of a view that is evaluated. Where the device's memory is the host's, nothing is kept
+// in what the run may need of it.
+std::shared_ptr<const ViewPicture> Trainer::Impl::evaluated_photo(std::size_t view) {
+  if (!evaluated_photos) {
+    std::size_t room = PictureBudget::of(options, dataset, train_views).left;
+    const DeviceInfo& device = context.device();
+    if (device.type == DeviceType::kCpu) {
+      const std::size_t usable = usable_memory(device);
+      const std::size_t needed = estimate_memory(options, demand(density.limit()), device).total();
+      room = std::min(room, usable - std::min(usable, needed));
+    }
+    evaluated_photos.emplace(room);
+  }
+  return evaluated_photos->get(view, dataset.views[view]);
 }
 
 // That there are views to train on, and that they allow the options.

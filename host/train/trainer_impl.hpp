@@ -18,6 +18,7 @@
 
 #include "comm/communicator.hpp"
 #include "device/read_back.hpp"
+#include "eval/kept_pictures.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/evaluation.hpp"
@@ -101,8 +102,9 @@ struct Trainer::Impl {
        bool replace,
        Communicator* others);
 
-  // trainer.cpp: what views and options do not allow together.
+  // trainer.cpp: what views and options do not allow together, what photos may take.
   void check_views_and_options() const;
+  std::shared_ptr<const ViewPicture> evaluated_photo(std::size_t view);
 
   // trainer_start.cpp: from a data set to the first step.
   void start();
@@ -262,6 +264,7 @@ struct Trainer::Impl {
   PhotoFit fit;
   std::optional<ModelValidator> validator;  // once it is asked for
   PhotoCache photo_cache;
+  std::optional<KeptPictures> evaluated_photos;  // once one is asked for; of views by their number
   ViewOrder order{0, 0};  // of views, of which a step takes several (apply_options())
 
   DeviceGaussians gaussians;

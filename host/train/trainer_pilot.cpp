@@ -19,6 +19,8 @@ namespace {
 
 constexpr double kBriefRun = 60;         // seconds
 constexpr double kMeasuredShare = 0.05;  // of the time of a run that timed steps may take
+constexpr double kMostMeasured = 600;    // seconds of them: more steps tell nothing new
+constexpr double kLongest = 1e9;         // seconds, 30 years
 constexpr int kLeastSteps = 3;           // of a kind that are timed
 constexpr int kViews = 6;                // that they show
 constexpr double kCoarseShare = 0.2;     // of the time for steps that coarse ones take
@@ -31,9 +33,11 @@ constexpr std::int64_t kFewIterations = 500;
 constexpr double kLatestEnd = 2;         // of the iterations that were planned
 constexpr double kTellingChange = 0.03;  // of them, that users are told of
 
-void require_finite(double seconds) {
-  if (std::isfinite(seconds)) return;
-  throw UsageError(fmt::format("A time of {} s is not finite: give seconds that end", seconds));
+void require_end(double seconds) {
+  // Written so that NaN is refused.
+  if (seconds <= kLongest) return;
+  throw UsageError(fmt::format("A time of {} s has no end in sight: give at most {:.0f} seconds",
+                               seconds, kLongest));
 }
 
 class Timer {
@@ -239,8 +243,8 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   begin_programs({active_sh_degree(options, 0), active_sh_degree(options, options.iterations / 2)});
   choose_background();
   choose_color_range();
-  first_model = new_model(most);
-  std::optional<Gaussians> made = first_model;
+  Gaussians made = new_model(most);
+  first_model = made;
   pilot.start_seconds = ranks.broadcast_value(0, timer.seconds());
   upload_first_model(most);
   pilot.first = gaussians.count;
@@ -260,7 +264,7 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
 
 RunEstimate Trainer::Impl::estimate(double seconds) {
   check_not_begun("estimate");
-  require_finite(seconds);
+  require_end(seconds);
   const Pilot pilot = run_pilot(seconds, std::nullopt);
   const std::size_t most = most_gaussians(options.iterations);
   const bool grows = density.accumulates_at(0);
@@ -273,13 +277,13 @@ RunEstimate Trainer::Impl::estimate(double seconds) {
 
 RunEstimate Trainer::Impl::fit_time(double seconds) {
   check_not_begun("fit_time");
-  require_finite(seconds);
+  require_end(seconds);
   if (!(seconds > 0)) {
     throw UsageError(fmt::format("A run of {} s trains nothing: give it more time", seconds));
   }
   // What finds them takes seconds.
   if (seconds < kBriefRun) options.photo_points = false;
-  const Pilot pilot = run_pilot(kMeasuredShare * seconds, seconds);
+  const Pilot pilot = run_pilot(std::min(kMeasuredShare * seconds, kMostMeasured), seconds);
   const double left = seconds - pilot.seconds;
   const auto duration = [&](std::int64_t iterations) {
     return predicted_seconds(pilot, iterations, most_gaussians(iterations));

@@ -139,6 +139,7 @@ void Trainer::Impl::evaluate_views(bool last) {
   choice.max_views = last ? 0 : static_cast<std::size_t>(options.eval_views);
   choice.max_pictures = static_cast<std::size_t>(options.eval_renders);
   choice.align = last && options.poses;
+  choice.photo = [this](std::size_t view) { return evaluated_photo(view); };
   const EvaluationRow row = measure(dataset, run.evaluation_folder(iteration), choice);
   run.record(row);
   if (watcher) watcher->evaluated(run.evaluations().back());

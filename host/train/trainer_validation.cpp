@@ -83,6 +83,7 @@ void Trainer::Impl::validate_views() {
   EvaluationOptions choice;
   choice.align = options.poses;
   choice.align_colors = exposure.has_value();
+  choice.photo = [this](std::size_t i) { return evaluated_photo(train_views[apart[i]]); };
   EvaluationRow row = measure(validation, {}, choice);
   row.psnr = row.psnr_aligned.value_or(exposure ? row.psnr_corrected : row.psnr);
   const std::vector<EvaluationRow>& rows = run.validations();

@@ -60,7 +60,9 @@ Camera downscaled(const Camera& camera, double factor);
 Camera moved(const Camera& camera, const glm::dvec3& turn, const glm::dvec3& shift);
 
 /// A camera at `eye` that looks at `target`; `up` is the world direction that points up in the
-/// image, `focal` the focal length in pixels. The principal point is the middle of the picture.
+/// image (along the view any roll will do), `focal` the focal length in pixels. The principal point
+/// is the middle of the picture. Throws UsageError where `eye` is `target`, or a number is not
+/// finite.
 Camera look_at(const glm::dvec3& eye,
                const glm::dvec3& target,
                const glm::dvec3& up,

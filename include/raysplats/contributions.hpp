@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -12,10 +13,13 @@
 
 namespace raysplats {
 
+/// How many views contributions() looks at, at most.
+constexpr std::size_t kMostContributionViews = 64;
+
 /// What each Gaussian gives to the pictures of views: the mean over their pixels of its share of
-/// the light, alpha times the transmittance before it, as the backward pass adds it up. Views that
-/// are many are thinned out evenly (64), and large pictures made smaller (600 000 pixels). Throws
-/// as Tracer, and UsageError without a camera.
+/// the light, alpha times the transmittance before it, as the backward pass adds it up. More
+/// views than kMostContributionViews are thinned out evenly, and large pictures made smaller
+/// (600 000 pixels). Throws as Tracer, and UsageError without a camera.
 std::vector<double> contributions(Context& context,
                                   const Gaussians& model,
                                   std::span<const Camera> cameras,

@@ -142,7 +142,8 @@ struct ViewPicture {
 /// The photo of a view with what its mask ignores.
 ViewPicture load_view_picture(const View& view);
 
-/// RGB of `rgba` over a constant background.
+/// RGB of `rgba` over a constant background. Throws UsageError for a picture without pixels, or
+/// with more or fewer numbers than it has.
 Image composite(const Image& rgba, const float background[3]);
 
 }  // namespace raysplats

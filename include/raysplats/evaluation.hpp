@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -73,6 +74,9 @@ struct EvaluationOptions {
   /// With `ranks`: every rank renders every view, and what `render` yields is a picture for the
   /// rank that leads alone, which compares it. It is empty for all or none.
   bool together = false;
+  /// The photo of a view, by its number in the data set, for callers that keep some;
+  /// load_view_picture() when unset.
+  std::function<std::shared_ptr<const ViewPicture>(std::size_t view)> photo = {};
 };
 
 /// The names of the pictures that evaluate() writes of all views of a split, without extension.
@@ -84,8 +88,9 @@ std::vector<std::string> evaluated_names(const Dataset& dataset, Split split);
 /// set's alpha is background; else alpha is a mask, and where it is 0 the photo takes the place of
 /// the render. With an output folder the photo | render | error of views goes to NAME.png there,
 /// and the report to metrics.json, unless it was stopped before the first comparison. Throws
-/// UsageError when the split has no views or a render has another size than its photo, DataError
-/// when masks leave no pixel of any view; single views without one are left out with a warning.
+/// UsageError when the split has no views, or a render or photo another size than its camera or
+/// more or fewer numbers than its size says, DataError when masks leave no pixel of any view;
+/// single views without one are left out with a warning.
 EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
                           const Dataset& dataset,
                           Split split,

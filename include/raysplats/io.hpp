@@ -30,8 +30,9 @@ struct ModelEncoding {
 
 /// Reads Gaussians from a 3DGS PLY, PlayCanvas' compressed PLY and SOG, .splat, SPZ (1 to 4) or
 /// glTF with KHR_gaussian_splatting, recognised by their first bytes, .splat by its name; of a SOG
-/// that is unpacked its folder or its meta.json. glTF is turned to the y down of captures. Throws DataError for anything malformed, truncated, oversized
-/// or, unless `encoding` drops them, with numbers that are not finite.
+/// that is unpacked its folder or its meta.json. glTF is turned to the y down of captures. Throws
+/// DataError for anything malformed, truncated, oversized or, unless `encoding` drops them, with
+/// numbers that are not finite.
 Gaussians read_model(const std::filesystem::path& path, const ModelEncoding& encoding = {});
 
 /// Writes atomically what the name's extension says: .ply, .compressed.ply, .splat, .spz, .sog or
@@ -56,7 +57,8 @@ Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite = fals
 /// `trace` is how the model wants to be traced; the options of it that change the picture (order,
 /// quantile, adaptive radius, near depth, transmittance, cap on hits, background) go into the
 /// header as comments, which other programs skip; so does `origin`, from which positions count
-/// (Dataset::origin), unless it is 0.
+/// (Dataset::origin), unless it is 0. Throws DataError for numbers that are not finite and for
+/// quaternions that are no rotations, and UsageError where the arrays do not fit each other.
 void write_ply(const std::filesystem::path& path,
                const Gaussians& model,
                const std::optional<TraceOptions>& trace = std::nullopt,

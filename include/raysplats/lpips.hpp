@@ -23,8 +23,9 @@ class Lpips {
   Lpips(Lpips&&) noexcept;
   Lpips& operator=(Lpips&&) noexcept;
 
-  /// Distance of two RGB images in [0, 1]; 0 = equal. Throws UsageError when the sizes differ,
-  /// DataError when the network does not take the size or yields anything but one finite number.
+  /// Distance of two RGB images in [0, 1]; 0 = equal. Throws UsageError when the sizes differ or
+  /// the numbers are fewer or more than they say, DataError when the network does not take the size
+  /// or yields anything but one finite number.
   double distance(const Image& image, const Image& photo);
 
  private:

@@ -7,7 +7,7 @@ namespace raysplats {
 
 /// One ray o + t d, t in [t_min, t_max]; d need not be normalised, and every t is in units of |d|.
 struct Ray {
-  float origin[3];     ///< world units
+  float origin[3];     ///< world units, at most 1e19 from 0
   float t_min;         ///< at least 0
   float direction[3];  ///< of a length above 0, at most 1e19
   float t_max;         ///< at least t_min; infinity: without end

@@ -93,8 +93,8 @@ struct TrainOptions {
   /// "r,g,b".
   std::string background = "auto";
   int sky_degree = 2;  ///< of the light of background "sky" by direction; 0 = one trained colour
-  /// MiB of photos and depth maps kept on the device; the others are read again when their turn
-  /// comes.
+  /// MiB of photos and depth maps kept on the device, and of test photos beside it as far as those
+  /// leave room; the others are read again when their turn comes.
   std::int64_t image_budget = 1024;
   /// Coarse sizes, in the order of the run; full size behind the last, and where there are none.
   std::vector<ResolutionStep> resolution_schedule{{4, 0.1}, {3, 0.18}, {2, 0.4}};

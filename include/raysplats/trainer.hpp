@@ -93,10 +93,10 @@ class Trainer {
   /// everything back: the run is as without. Throws UsageError once training has begun.
   RunEstimate estimate(double seconds);
   /// Sets options.iterations, and max_gaussians where that is 0, so that measuring (a twentieth of
-  /// it) and training take `seconds`; RUN/config.toml names both. When the run's last steps have
-  /// begun, some are timed and options.end_iteration is set to where the time will be over, there
-  /// too. Throws UsageError once training has begun, and for a time in which nothing can be
-  /// trained.
+  /// it, at most ten minutes) and training take `seconds`; RUN/config.toml names both. When the
+  /// run's last steps have begun, some are timed and options.end_iteration is set to where the time
+  /// will be over, there too. Throws UsageError once training has begun, and for a time in which
+  /// nothing can be trained or that is beyond 1e9 s.
   RunEstimate fit_time(double seconds);
 
   /// Trains up to options.iterations, or end_iteration. SIGINT, SIGTERM, SIGHUP and, where it would

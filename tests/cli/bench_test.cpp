@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "../skip_test.hpp"
 #include "program.hpp"
 
 namespace {
@@ -64,12 +65,31 @@ TEST_CASE("bench writes JSON and CSV that compare reads") {
   check_refused({"bench", "compare", folder / "a.json"}, 2, "B is required");
 }
 
+TEST_CASE("what bench has measured is in its files though nobody can read the table") {
+  Surroundings full;
+  full.out_file = "/dev/full";
+  SKIP_TEST_UNLESS(std::filesystem::exists(full.out_file), "there is no /dev/full");
+  const TemporaryFolder folder;
+  // So many rows that the table is written before the end of the program.
+  constexpr int kRows = 50;
+  std::string sizes = "100";
+  for (int i = 1; i < kRows; ++i) sizes += "," + std::to_string(100 + i);
+  check_refusal(raysplats_program({"bench", "--sizes", sizes, "--repeat", "1", "--filter", "adam/",
+                                   "-q", "--json", folder / "a.json", "--csv", folder / "a.csv",
+                                   "--html", folder / "a.html"},
+                                  full),
+                3, "Standard output cannot be written: ");
+  REQUIRE(entries(folder.path()) == 3);
+  CHECK(nlohmann::json::parse(read_file(folder / "a.json")).at("rows").size() == kRows);
+}
+
 TEST_CASE("bench measures a model seen by a camera") {
   const TemporaryFolder folder;
   write_file(folder / "balls.ply", ply_file(20));
   write_file(folder / "cameras.json",
              R"({"w":40,"h":30,"fl_x":40,"fl_y":40,"cx":20,"cy":15,"frames":[
-               {"file_path":"a.png","transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,6],[0,0,0,1]]}]})");
+               {"file_path":"a.png","transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,6],[0,0,0,1]]},
+               {"file_path":"b.png","transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,7],[0,0,0,1]]}]})");
   const std::vector<std::string> model{
       "bench",    "--model", folder / "balls.ply", "--cameras", folder / "cameras.json",
       "--repeat", "1",       "--filter",           "view",      "-q"};
@@ -79,7 +99,16 @@ TEST_CASE("bench measures a model seen by a camera") {
   CHECK(contains(outcome.out, "prepare-view/balls/20"));
   const nlohmann::json json = nlohmann::json::parse(read_file(folder / "m.json"));
   CHECK(json.at("options").at("resolution") == "40x30");
-  check_refused(with(model, {"--view", "1"}), 2, "--view 1 is beyond");
+  check_refused(with(model, {"--view", "2"}), 2, "--view 2 is beyond");
+
+  // What else is measured than before is said.
+  REQUIRE(raysplats_program(with(model, {"--view", "1", "--near", "0.5", "--launch-budget-ms", "50",
+                                         "--json", folder / "n.json"}))
+              .code == 0);
+  const Outcome compared =
+      raysplats_program({"bench", "compare", folder / "m.json", folder / "n.json"});
+  CHECK(contains(compared.out,
+                 "--launch-budget-ms: -1 -> 50\n--near: 0 -> 0.5\n--view: a.png -> b.png\n"));
 }
 
 TEST_CASE("bench writes one file for the owner of a device to send") {

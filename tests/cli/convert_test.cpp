@@ -130,6 +130,15 @@ TEST_CASE("convert keeps what the views of a run see") {
     return raysplats::read_ply(folder / name).means;
   };
   CHECK(kept(run.string(), "seen.ply") == std::vector<float>{1.5f, 0, 0, 2, 0, 0});
+  // Not all of many views are looked at.
+  const std::string camera = read_file(run / "cameras.json");
+  std::string many = camera.substr(0, camera.size() - 1);
+  for (int i = 1; i < 70; ++i) many += "," + camera.substr(1, camera.size() - 2);
+  write_file(run / "cameras.json", many + "]");
+  const Outcome thinned =
+      raysplats_program({"convert", run.string(), folder / "many.ply", "--max-gaussians", "2"});
+  CHECK(thinned.code == 0);
+  CHECK(contains(thinned.err, "what is seen in 64 of 70 views is kept"));
   write_file(folder / "alone.ply", ply_file(5));
   CHECK(kept(folder / "alone.ply", "first.ply") == std::vector<float>{0, 0, 0, 0.5f, 0, 0});
   const Outcome idle =

@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "barred_photos.hpp"
 #include "program.hpp"
 #include "raysplats/io.hpp"
 
@@ -63,6 +64,19 @@ TEST_CASE("info says which lenses loading takes out and which it keeps") {
     write_photos(folder, "PINHOLE 8 6 10 10 4 3");
     CHECK_FALSE(contains(told(folder / ""), "distort"));
   }
+}
+
+TEST_CASE("info finds black borders unless they are kept, in data sets alone") {
+  const TemporaryFolder folder;
+  write_barred_photos(folder);
+  CHECK(contains(told(folder / ""), "black borders    5 photos"));
+  CHECK(json_of(folder / "").at("borders") == 5);
+  const Outcome kept = succeed({"info", folder / "", "--borders", "keep"});
+  CHECK_FALSE(contains(kept.out, "black border"));
+  CHECK_FALSE(contains(kept.err, "black border"));
+  check_refused({"info", folder / "", "--borders", "cut"}, 2, "borders");
+  write_file(folder / "balls.ply", ply_file(3));
+  check_refused({"info", folder / "balls.ply", "--borders", "keep"}, 2, "--borders is about");
 }
 
 TEST_CASE("info knows a data set of PNG photos without the library of pictures") {

@@ -145,6 +145,22 @@ TEST_CASE("a run's own page is made anew, and its other files stay") {
   Place::check_refused(raysplats_program({"report", place.path("none")}), 3, "does not exist");
 }
 
+TEST_CASE("a page is not written over the evaluation that it shows") {
+  const Place place;
+  write_file(place.path("a/metrics.json"), R"({"evaluations":[{"iteration":5},{"iteration":60}]})");
+  const std::string evaluation = place.path("a/eval/iteration_60/");
+  for (const char* name : {"metrics.json", "0.png"}) {
+    const std::string read = evaluation + name;
+    write_file(read, "{}");
+    for (const Words& runs : {Words{place.path("a")}, Words{place.path("b"), place.path("a")}}) {
+      Place::check_refused(raysplats_program(Words{"report", "-o", read, "--overwrite"} + runs), 2,
+                           "is what is read");
+    }
+    CHECK(read_file(read) == "{}");
+  }
+  CHECK(raysplats_program({"report", place.path("a"), "-o", evaluation + "new.html"}).code == 0);
+}
+
 TEST_CASE("bench refuses results that would be lost") {
   const Place place;
   const Place::Writer& json = place.writers.at(5);

@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs whose length is not given in iterations.
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <string>
 
+#include "barred_photos.hpp"
 #include "program.hpp"
+#include "raysplats/io.hpp"
 
 namespace {
 
@@ -53,6 +57,41 @@ TEST_CASE("a quality leaves what a configuration says of length and size") {
       {"train", data, "-o", look, "--quality", "preview", "--config", folder / "my.toml", "-q"});
   CHECK(value_of(look, "iterations") == "12");
   CHECK(value_of(look, "downscale") == "3");
+}
+
+TEST_CASE("photos that are reduced are looked at once") {
+  const TemporaryFolder folder;
+  write_barred_photos(folder);
+  const Outcome outcome = succeed({"train", folder.path().string(), "-o", folder / "run",
+                                   "--quality", "preview", "-n", "2", "--init", "random"});
+  CHECK(contains(outcome.err, "Photos are reduced"));
+  const std::string line = "have the same black border";
+  const std::size_t first = outcome.err.find(line);
+  REQUIRE(first != std::string::npos);
+  CHECK(outcome.err.find(line, first + 1) == std::string::npos);
+}
+
+TEST_CASE("a quality reduces copies that are all there is of the photos") {
+  const TemporaryFolder folder;
+  constexpr int kWidth = 500, kHeight = 250;
+  std::string images;
+  for (std::size_t photo = 0; photo < 5; ++photo) {
+    raysplats::Image image(kWidth, kHeight, 3);
+    for (std::size_t i = 0; i < image.data.size(); ++i)
+      image.data[i] = 0.3f + 0.002f * static_cast<float>((i + 7 * photo) % 300);
+    raysplats::write_image(folder / fmt::format("images_2/{}.png", photo), image);
+    images += fmt::format("{} 1 0 0 0 {} 0 4 1 {}.png\n\n", photo + 1,
+                          0.1 * static_cast<double>(photo), photo);
+  }
+  write_file(folder / "sparse/0/cameras.txt", "1 PINHOLE 1000 500 900 900 500 250\n");
+  write_file(folder / "sparse/0/images.txt", images);
+  write_file(folder / "sparse/0/points3D.txt", "");
+  const std::string run = folder / "run";
+  const Outcome outcome = succeed({"train", folder.path().string(), "-o", run, "--quality",
+                                   "preview", "-n", "2", "--init", "random"});
+  CHECK(contains(outcome.err, "Photos are reduced 6 times each way"));
+  CHECK(value_of(run, "downscale") == "6");
+  CHECK(contains(read_file(run + "/cameras.json"), "\"width\":167"));
 }
 
 TEST_CASE("a command with a quality or a time begins a run, and goes on with it") {

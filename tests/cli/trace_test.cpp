@@ -58,6 +58,17 @@ TEST_CASE("rays of a file are traced into a file") {
   std::ifstream moved(folder / "seen.npz", std::ios::binary);
   CHECK(bytes == std::string((std::istreambuf_iterator<char>(moved)), {}));
 
+  // The mirrors of a run are about cameras, too.
+  const std::string run = folder / "run";
+  std::filesystem::create_directories(run + "/point_cloud/iteration_7");
+  write_ply(run + "/point_cloud/iteration_7/point_cloud.ply", model);
+  std::ofstream(run + "/config.toml") << "mirrors = [\"mirror.obj\"]\n";
+  const Outcome of_run =
+      raysplats_program({"trace", run, "--rays", folder / "rays.npy", "-o", folder / "run.npz"});
+  CHECK(of_run.code == 0);
+  CHECK(of_run.err.find("trained with mirrors, which rays of your own do not meet") !=
+        std::string::npos);
+
   std::vector<std::string> one_array = arguments;
   one_array[5] = folder / "seen.npy";
   const Outcome of_one = raysplats_program(one_array);

@@ -34,7 +34,9 @@ TEST_CASE("help of train lists the configuration keys and hides foreign names") 
 }
 
 TEST_CASE("a wrong command line is one sentence, exit code 2") {
-  check_refused({}, 2, "No command given");
+  check_refused({}, 2, "No command given: use one of devices, ");
+  CHECK_FALSE(contains(raysplats_program({}).err, "compile-kernels"));
+  CHECK_FALSE(contains(raysplats_program({"compile-kernel"}).err, "compile-kernels"));
   check_refused({"rendr"}, 2, "did you mean 'render'");
   check_refused({"render", "m.ply", "--backgroud", "1,1,1", "-o", "x", "--orbit", "3"}, 2,
                 "did you mean --background");
@@ -55,6 +57,7 @@ TEST_CASE("a wrong command line is one sentence, exit code 2") {
   check_refused({"devices", "--json", "--clear-cache"}, 2, "leave out --json");
   check_refused({"render", "m.ply", "--orbit", "0", "-o", "x"}, 2, "--orbit");
   check_refused({"render", "m.ply", "--orbit", "3"}, 2, "--video");
+  check_refused({"view", "m.ply", "--up", "0,0,0"}, 2, "The up direction has no length");
   check_refused({"render", "m.ply", "-o", "x", "--path", "p", "--orbit", "3"}, 2, "--path");
   check_refused({"render", "m.ply", "-o", "x", "--spiral", "3"}, 2, "--data");
   check_refused({"render", "m.ply", "-o", "x", "--orbit", "3", "--seconds", "3"}, 2, "--path");

@@ -7,6 +7,7 @@ import struct
 import zlib
 
 HOSTILE = """<script>alert("1")</script> & 'so' ]]> \u00e9 &amp;"""
+WIDE = 200 * "x"  # has nowhere to break a line
 
 
 def png(width, height):
@@ -22,9 +23,9 @@ def png(width, height):
 
 
 def write_run(folder, seed=0):
-    views = [{"name": f"{HOSTILE} {i}", "psnr": 20 + (7 * i + seed) % 10, "ssim": 0.8, "sharpness": 0.01,
+    views = [{"name": f"{HOSTILE} {i}{WIDE}", "psnr": 20 + (7 * i + seed) % 10, "ssim": 0.8, "sharpness": 0.01,
               "center": [i, i % 3, 1], "picture": f"{i}.png"} for i in range(9)]
-    views.append({"name": HOSTILE, "psnr": 3, "ssim": 0.1, "sharpness": 1e-7, "center": [9, 9, 9]})
+    views.append({"name": HOSTILE + WIDE, "psnr": 3, "ssim": 0.1, "sharpness": 1e-7, "center": [9, 9, 9]})
     metrics = {
         "complete": False, "iteration": 20, "iterations": 90, "gaussians": 100, "most_gaussians": 100,
         "device": HOSTILE, "driver": HOSTILE, "version": HOSTILE, "data": HOSTILE, "seed": seed,

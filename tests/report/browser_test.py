@@ -13,7 +13,7 @@ from selenium.webdriver.common.by import By
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [HERE, os.path.join(HERE, "../view")]
-from awkward_run import HOSTILE, write_ablation, write_run  # noqa: E402
+from awkward_run import HOSTILE, WIDE, write_ablation, write_run  # noqa: E402
 from browser import BrowserCase, main  # noqa: E402
 
 
@@ -71,7 +71,7 @@ class ReportTest(BrowserCase):
         self.assertEqual(len(self.page.find_elements(By.TAG_NAME, "figure")), 3)
 
     def test_awkward_runs(self):
-        runs = [self.path(f"run_{i}_<b>&'") for i in range(2)]
+        runs = [self.path(f"run_{i}_<b>&'{WIDE}") for i in range(2)]
         for i, run in enumerate(runs):
             write_run(run, i)
         for name, given in (("awkward", runs[:1]), ("several", runs)):

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <set>
 
+#include "bench/bench_cases.hpp"
 #include "bench/ceilings.hpp"
 #include "bench/operation.hpp"
 #include "device/fault_injection.hpp"
@@ -88,7 +89,8 @@ TEST_CASE("bench: a model and a filter") {
   Context context(test_device(), timed_options());
   BenchOptions options = tiny_bench(2);
   options.filter = "forward/|rays/";
-  const BenchModel model{"my model", bench_scene("surface", 500, 3, 1), bench_camera(32, 48)};
+  BenchModel model{"my model", bench_scene("surface", 500, 3, 1), bench_camera(32, 48)};
+  model.camera.name = "my view";
   const BenchReport report = run_bench(context, options, &model);
   REQUIRE(report.rows.size() == 2);
   CHECK(report.rows[0].id() == "forward/my model/500");
@@ -97,6 +99,12 @@ TEST_CASE("bench: a model and a filter") {
   CHECK(report.rows[1].work.items.front().count == 256);
   CHECK(report.options.at("resolution") == "32x48");
   CHECK(report.options.at("sh-degree") == "1");
+  CHECK(report.options.at("view") == "my view");
+  // Two models are told apart by any of their numbers.
+  const std::string before = report.options.at("model");
+  CHECK(bench_header(context, options, &model).options.at("model") == before);
+  model.gaussians.sh.back() += 0.01f;
+  CHECK(bench_header(context, options, &model).options.at("model") != before);
   options.filter = "nothing";
   CHECK_THROWS_AS(run_bench(context, options, &model), UsageError);
 }

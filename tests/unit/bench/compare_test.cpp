@@ -59,3 +59,13 @@ TEST_CASE("compare: rows of one file only and other circumstances are listed") {
   CHECK(table.find("only in B: densify/random/1000") != std::string::npos);
   CHECK(table.find("--resolution: 8x6 -> 16x12") != std::string::npos);
 }
+
+TEST_CASE("compare: options that only one of the files has are listed") {
+  const BenchReport before = sample_report();
+  BenchReport after = before;
+  after.options["near"] = "0.5";
+  CHECK(compare_reports(before, after).differing ==
+        std::vector<std::string>{"--near: not in the file -> 0.5"});
+  CHECK(compare_reports(after, before).differing ==
+        std::vector<std::string>{"--near: 0.5 -> not in the file"});
+}

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -364,6 +365,20 @@ TEST_CASE("evaluator: limits, early stop, LPIPS and refusals") {
 
   const auto wrong_size = [](const Camera&) { return Image(2, 2, 3); };
   CHECK_THROWS_AS(evaluate(wrong_size, scene.dataset, Split::kTest, kBackground), UsageError);
+  const auto too_short = [](const Camera& camera) {
+    Image image(camera.width, camera.height, 3);
+    image.data.pop_back();
+    return image;
+  };
+  CHECK_THROWS_AS(evaluate(too_short, scene.dataset, Split::kTest, kBackground), UsageError);
+  EvaluationOptions other_photo;
+  other_photo.photo = [&](std::size_t i) {
+    auto picture = std::make_shared<ViewPicture>(load_view_picture(scene.dataset.views[i]));
+    picture->rgba.data.pop_back();
+    return picture;
+  };
+  CHECK_THROWS_AS(evaluate(render, scene.dataset, Split::kTest, kBackground, {}, other_photo),
+                  UsageError);
   for (View& view : scene.dataset.views) view.test = false;
   CHECK_THROWS_AS(evaluate(render, scene.dataset, Split::kTest, kBackground), UsageError);
 }

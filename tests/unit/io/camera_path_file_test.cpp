@@ -190,6 +190,12 @@ TEST_CASE("a fov that no pinhole has is refused, of fisheyes with nerfstudio's c
     CHECK(said("fisheye").find("pinhole with its focal length") != std::string::npos);
     CHECK(said("equirectangular").empty());
   }
+  file["keyframes"][1].erase("fov");
+  file["default_fov"] = 360;
+  CHECK(refusal(folder.write("path.json", file.dump())).empty());  // of panoramas, whose it is
+  file["camera_type"] = "perspective";
+  CHECK(refusal(folder.write("path.json", file.dump())).find("'default_fov' 360 where at most") !=
+        std::string::npos);
 }
 
 TEST_CASE("keyframes in TOML are eye, target, up, angle and seconds") {

@@ -170,7 +170,7 @@ TEST_CASE("a model with a number that is not finite is written in no format") {
     Gaussians bad = model;
     bad.means[4] = std::numeric_limits<float>::quiet_NaN();
     const std::string told = data_error([&] { write_model(scratch / name, bad); });
-    CHECK(contains(told, "Number 4 of the Gaussians' means is not finite"));
+    CHECK(contains(told, "Gaussian 1 has a number of 'means' that is not finite"));
     CHECK(!fs::exists(scratch / name));
     write_model(scratch / name, model);
     CHECK(read_model(scratch / name).size() == 2);

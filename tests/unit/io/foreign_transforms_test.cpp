@@ -218,6 +218,58 @@ TEST_CASE("photos are found in another letter case, unless two differ in nothing
   CHECK(log.contains("'images/A.jpg' of frame 0"));
 }
 
+TEST_CASE("photos are found with another extension, unless two are, or a frame has the photo") {
+  const Scratch scratch;
+  write_scene(scratch, {"images/a.jpeg", "images/b.PNG", "images/c.png"},
+              {"images/a.jpg", "images/b.JPG", "images/c.png"});
+  {
+    const LogCapture log;
+    const Dataset dataset = load_dataset(scratch.path());
+    REQUIRE(dataset.views.size() == 3);
+    CHECK(log.lines() == 1);
+    CHECK(log.contains("2 of 3 photos have another extension than"));
+    CHECK(log.contains("'images/a.jpeg'"));
+    CHECK(fs::equivalent(dataset.views[1].image_path, scratch / "images/b.JPG"));
+  }
+  write_image(scratch / "images/a.png", Image(40, 30, 3, 0.5f));
+  {
+    const LogCapture log;
+    CHECK(load_dataset(scratch.path()).views.size() == 2);
+    CHECK(log.contains("'images/a.jpeg' of frame 0"));
+  }
+  const Scratch other;
+  write_scene(other, {"a.png", "a.jpg", "b.png"}, {"a.png", "b.png"});
+  const LogCapture log;
+  CHECK(load_dataset(other.path()).views.size() == 2);
+  CHECK(log.contains("'a.jpg' of frame 1"));
+}
+
+TEST_CASE("intrinsics of another size than the photos' are warned of") {
+  const Scratch scratch;
+  const auto warns = [&](const std::string& keys) {
+    write_scene(scratch, {"a.png", "b.png"}, {"a.png", "b.png"}, keys);
+    const LogCapture log;
+    CHECK(load_dataset(scratch.path()).views.size() == 2);
+    const int center = log.contains("The principal point of 2 of 2 photos is far") ? 1 : 0;
+    const int angle = log.contains("contradict each other in 2 of 2 frames") ? 2 : 0;
+    return center + angle;
+  };
+  // Photos of 40 x 30 pixels.
+  CHECK(warns(R"("cx": 20.5, "cy": 14, )") == 0);
+  CHECK(warns(R"("cx": 14, "cy": 18, )") == 0);
+  CHECK(warns(R"("cx": 10, "cy": 7.5, )") == 1);
+  CHECK(warns(R"("cx": 20, "cy": 3, )") == 1);
+  CHECK(warns(R"("w": 20, "h": 15, "cx": 10, "cy": 7.5, )") == 0);
+  CHECK(warns(R"("w": 20, "h": 15, "cx": 20, "cy": 15, )") == 1);
+  // fl_x is 50.
+  CHECK(warns(R"("camera_angle_x": 0.7, )") == 0);
+  CHECK(warns(R"("camera_angle_x": 0.395, )") == 2);
+  CHECK(warns(R"("camera_angle_x": 1.29, )") == 2);
+  CHECK(warns(R"("w": 20, "h": 15, "camera_angle_x": 0.395, )") == 0);
+  CHECK(warns(R"("camera_model": "OPENCV_FISHEYE", "camera_angle_x": 1.29, )") == 0);
+  CHECK(warns(R"("cx": 10, "cy": 7.5, "camera_angle_x": 0.395, )") == 3);
+}
+
 TEST_CASE("points that another machine has elsewhere are found beside the file, which is told") {
   const Scratch scratch;
   write_bytes(scratch / "sparse_pc.ply",

@@ -280,6 +280,40 @@ TEST_CASE("colours of another profile than sRGB are told once, of whatever forma
   }
 }
 
+TEST_CASE("a PNG whose gAMA says that it is light is told, where nothing goes before it") {
+  const auto told = [](const std::string& space, const std::string& profile) {
+    const Scratch scratch;
+    const auto output = OIIO::ImageOutput::create((scratch / "a.png").string());
+    REQUIRE(output);
+    OIIO::ImageSpec spec(40, 30, 3, OIIO::TypeUInt8);
+    spec.attribute("oiio:ColorSpace", space);
+    if (!profile.empty()) {
+      spec.attribute("ICCProfile",
+                     OIIO::TypeDesc(OIIO::TypeDesc::UINT8, static_cast<int>(profile.size())),
+                     profile.data());
+    }
+    REQUIRE(output->open((scratch / "a.png").string(), spec));
+    REQUIRE(output->write_image(OIIO::TypeUInt8, std::vector<std::uint8_t>(3600, 90).data()));
+    REQUIRE(output->close());
+    // The chunk is what is wanted here.
+    const bool has_gamma = contains(read_bytes(scratch / "a.png"), "gAMA");
+    CHECK(has_gamma == (space != "none"));
+    write_bytes(scratch / "transforms.json",
+                fmt::format("{{\"fl_x\": 50, \"frames\": [{{\"file_path\": \"a.png\", "
+                            "\"transform_matrix\": {}}}]}}",
+                            matrix_json(0)));
+    const LogCapture log;
+    CHECK(load_dataset(scratch.path()).views.size() == 1);
+    CHECK(log.lines() == (log.contains("a.png are those of a gAMA of") ? 1u : 0u));
+    return log.contains("gAMA of 1.00");
+  };
+  CHECK(told("Linear", ""));
+  CHECK_FALSE(told("Linear", icc_profile("sRGB IEC61966-2.1")));
+  CHECK_FALSE(told("Gamma2.2", ""));
+  CHECK_FALSE(told("sRGB", ""));
+  CHECK_FALSE(told("none", ""));
+}
+
 TEST_CASE("the size of a JPEG is found behind a profile of many segments") {
   const Scratch scratch;
   write_with_profile(scratch / "a.jpg", icc_profile(std::string(150000, 'x')));

@@ -104,6 +104,54 @@ TEST_CASE("reduced copies of other names than the model's are left for images, w
   CHECK(contains(first().image_path.string(), "/images_4/"));
 }
 
+TEST_CASE("reduced copies that lack photos of images are left for it, with a warning") {
+  const Scratch scratch;
+  const ColmapFixture fixture = small_colmap();
+  fixture.write_binary(scratch / "sparse/0");
+  write_photos(fixture, scratch / "images", 40, 30);
+  write_photos(fixture, scratch / "images_2", 20, 15);
+  DatasetOptions options;
+  options.downscale = 2;
+  const auto check = [&](std::size_t views, const std::string& folder, std::size_t lines) {
+    const LogCapture log;
+    const Dataset dataset = load_dataset(scratch.path(), options);
+    CHECK(dataset.views.size() == views);
+    CHECK(contains(dataset.views.front().image_path.string(), folder));
+    CHECK(dataset.views.front().camera.width == 20);
+    CHECK(log.lines() == lines);
+    return log.contains("images_2 has 9 of the 10 photos of the model and ");
+  };
+  CHECK_FALSE(check(10, "/images_2/", 0));
+  fs::remove(scratch / "images_2/photo 8.png");
+  CHECK(check(10, "/images/", 1));
+  // What neither has is left out.
+  fs::remove(scratch / "images/photo 8.png");
+  CHECK_FALSE(check(9, "/images_2/", 1));
+}
+
+TEST_CASE("reduced copies of another size than their folder says are warned of") {
+  const ColmapFixture fixture = small_colmap();
+  DatasetOptions options;
+  options.downscale = 2;
+  const auto warns = [&](const Scratch& scratch) {
+    const LogCapture log;
+    CHECK(load_dataset(scratch.path(), options).views.size() == 10);
+    return log.contains("images_2 are 4 times smaller than ") && log.contains(", not 2 times");
+  };
+  const Scratch scratch;
+  fixture.write_binary(scratch / "sparse/0");
+  write_photos(fixture, scratch / "images_2", 10, 8);
+  CHECK(warns(scratch));  // than the cameras
+  write_photos(fixture, scratch / "images", 40, 30);
+  CHECK(warns(scratch));
+  // Of copies that the model was made of, those in images tell the size.
+  write_photos(fixture, scratch / "images", 80, 60);
+  write_photos(fixture, scratch / "images_2", 40, 30);
+  const LogCapture log;
+  CHECK(load_dataset(scratch.path(), options).views.front().camera.width == 40);
+  CHECK(log.lines() == 0);
+}
+
 TEST_CASE("names of a COLMAP model may begin with a folder of the data set") {
   const Scratch scratch;
   ColmapFixture fixture = small_colmap();

@@ -260,4 +260,7 @@ TEST_CASE("compositing blends by alpha and repeats grey") {
   CHECK(out.data[2] == doctest::Approx(0.15));
   CHECK(composite(Image(1, 1, 1, 0.3f), background).data == std::vector<float>{0.3f, 0.3f, 0.3f});
   CHECK(composite(Image(1, 1, 3, 0.3f), background).data == std::vector<float>{0.3f, 0.3f, 0.3f});
+  Image short_one(2, 2, 4);
+  short_one.data.pop_back();
+  CHECK_THROWS_AS(composite(short_one, background), UsageError);
 }

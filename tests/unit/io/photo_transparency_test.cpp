@@ -10,6 +10,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "unit/io/data_sets.hpp"
+#include "unit/log_capture.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -81,16 +82,50 @@ TEST_CASE("few photos with something transparent, or few pixels of all, do not m
   const Scratch scratch;
   write_photos(scratch,
                [](int photo, int x, int y) { return photo % 5 == 0 ? body(photo, x, y) : 1.0f; });
-  CHECK_FALSE(background(scratch));
+  {
+    const LogCapture log;
+    CHECK_FALSE(background(scratch));
+    CHECK(log.contains("2 of 10 photos have something transparent: it does not count"));
+    CHECK_FALSE(background(scratch, AlphaUse::kIgnore));
+    CHECK(log.lines() == 1);
+  }
   write_photos(scratch, [](int photo, int x, int y) { return x == photo && y == 3 ? 0.0f : 1.0f; });
   CHECK_FALSE(background(scratch));
+}
+
+TEST_CASE("where a few photos disagree more of them are looked at") {
+  // Three of the five, and no more of the ten.
+  const Scratch scratch;
+  write_photos(scratch, [](int photo, int x, int y) {
+    return photo % 2 == 0 && photo < 6 ? body(photo, x, y) : 1.0f;
+  });
+  const LogCapture log;
+  CHECK_FALSE(background(scratch));
+  CHECK(log.contains("3 of 10 photos have"));
+}
+
+TEST_CASE("photos with alpha among others without are found, wherever they lie") {
+  const Scratch scratch;
+  write_photos(scratch, body);
+  const auto make_opaque = [&](int photo) {
+    write_image(scratch / ("photo_" + std::to_string(photo) + ".png"),
+                Image(kWidth, kHeight, 3, 0.5f));
+  };
+  // Those that a few, evenly spread, would be.
+  for (int photo = 0; photo < kPhotos; photo += 2) make_opaque(photo);
+  const LogCapture log;
+  CHECK_FALSE(background(scratch));
+  CHECK(log.contains("5 of 10 photos have"));
+  write_photos(scratch, body);
+  for (const int photo : {0, 2, 4, 6}) make_opaque(photo);
+  CHECK(background(scratch));
 }
 
 TEST_CASE("a border that all photos share is unknown, unless they are rendered or it is most") {
   const Scratch scratch;
   write_photos(scratch, corners);
   const Dataset dataset = load_dataset(scratch.path());
-  CHECK(io::transparency(dataset.views) == io::Transparency::kBorder);
+  CHECK(io::transparency(dataset.views).kind == io::Transparency::kBorder);
   CHECK_FALSE(dataset.alpha_is_background);
   CHECK(background(scratch, AlphaUse::kCutout));
   // On a turntable what is symmetric has the same outline in all photos.

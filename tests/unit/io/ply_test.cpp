@@ -393,7 +393,12 @@ TEST_CASE("a model that cannot be written leaves no file") {
   const Scratch scratch;
   Gaussians broken = random_model(3, 0);
   broken.means.pop_back();
-  CHECK(contains(data_error([&] { write_ply(scratch / "a.ply", broken); }), "different lengths"));
+  CHECK(contains(message_of<UsageError>([&] { write_ply(scratch / "a.ply", broken); }),
+                 "give every array its size"));
+  broken = random_model(3, 1);
+  broken.sh[12 + 7] = std::numeric_limits<float>::infinity();
+  CHECK(contains(data_error([&] { write_ply(scratch / "a.ply", broken); }),
+                 "Gaussian 1 has a number of 'sh' that is not finite"));
   CHECK(fs::is_empty(scratch.path()));
   write_bytes(scratch / "file", "x");
   CHECK(data_error([&] { write_ply(scratch / "file" / "a.ply", random_model(3, 0)); }) != "");

@@ -428,6 +428,11 @@ TEST_CASE("models and tracers refuse what cannot be traced") {
   bad.direction[0] = 9e18f;
   CHECK(refused(bad).empty());
   bad = good;
+  bad.origin[1] = -2e19f;
+  CHECK(refused(bad).find("an origin farther than 1e19 from 0") != std::string::npos);
+  bad.origin[1] = -9e18f;
+  CHECK(refused(bad).empty());
+  bad = good;
   bad.t_min = 2;
   bad.t_max = 1;
   CHECK(refused(bad).find("ends before it begins") != std::string::npos);

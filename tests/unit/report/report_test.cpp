@@ -133,6 +133,19 @@ TEST_CASE("a report holds what the run says, escaped, and nothing from elsewhere
   CHECK(fs::file_size(run.path() / "report.html") == page.size());
 }
 
+TEST_CASE("what is written of a run comes with a line about its warnings, if it has any") {
+  const Run run;
+  const fs::path file = run.path() / "page.html";
+  CHECK(write_run_report(run.path(), file) ==
+        "2 warnings in " + file.string() +
+            ", the first: 5.00 % of the rays stopped at --max-hits: raise it");
+  run.write("metrics.json", R"({"complete":true,"traced_rays":1000,"capped_rays":50})");
+  CHECK(write_run_report(run.path(), file) ==
+        "1 warning in " + file.string() + ": 5.00 % of the rays stopped at --max-hits: raise it");
+  run.write("metrics.json", R"({"complete":true})");
+  CHECK(write_run_report(run.path(), file).empty());
+}
+
 TEST_CASE("the end of a run is compared with evaluations of as many views") {
   const Run run;
   const auto page_of = [&](const std::string& evaluations) {
@@ -150,6 +163,20 @@ TEST_CASE("the end of a run is compared with evaluations of as many views") {
   CHECK(contains(page_of(easy + R"({"iteration":150,"psnr":22,"views":9},
                               {"iteration":200,"psnr":21.5,"views":9})"),
                  "ends 0.50 dB below its best, at iteration 150"));
+}
+
+TEST_CASE("a damaged picture is told in its place, and the others are shown") {
+  const Run run("_<one>"), other("_two");
+  run.write("eval/iteration_200/good.png", "damaged");
+  const std::string page = run_report(run.path());
+  CHECK(fault(page) == "");
+  CHECK(contains(page, "<p>Best: good.png, 30.00 dB: The image "));
+  CHECK(contains(page, "<figure><img alt=\"a&lt;b&gt;&amp;.png\" src=\"data:image/jpeg"));
+  CHECK(!contains(page, "<figure><img alt=\"good.png\""));
+  const std::string both = runs_report({run.path(), other.path()});
+  CHECK(fault(both) == "");
+  CHECK(contains(both, "<p>A: good.png, 30.00 dB: The image "));
+  CHECK(contains(both, "<figcaption>B: good.png, 30.00 dB (photo, render, error)"));
 }
 
 TEST_CASE("a report of a run that is under way or damaged says so") {
@@ -354,6 +381,13 @@ TEST_CASE("a report shows model, cameras, exposure, kernels and where it all com
   CHECK(contains(page, "aria-label=\"Gain of the colours\""));
   // 30 of 40 stand at an opacity of a half: the highest bar, in the middle.
   CHECK(contains(page, "x=\"250.0\" y=\"30.0\""));
+  for (const auto& [steps, text] : {std::pair(1, "1 step"), std::pair(2, "2 steps")}) {
+    run.write(
+        "metrics.json",
+        fmt::format(R"({{"timed_steps":{},"kernels":[{{"name":"k","share":0.75}}]}})", steps));
+    CHECK(contains(run_report(run.path()),
+                   fmt::format("<p>Device time in {} of training, one of every 32.</p>", text)));
+  }
 }
 
 TEST_CASE("cameras that were trained on have the colours of their own PSNR") {
@@ -443,6 +477,10 @@ TEST_CASE("several runs stand side by side, with what differs between them") {
   CHECK(fault(bare) == "");
   CHECK(contains(bare, "no held-out view in common"));
   CHECK(contains(bare, "All settings are the same"));
+  // It hides the best numbers of none, wherever it stands.
+  const std::string last = runs_report({third.path(), first.path(), second.path()});
+  CHECK(contains(last, "<td></td><td>20.25</td><td><b>23.50</b></td>"));
+  CHECK(contains(last, "<td></td><td><b>0.7500</b></td><td>0.7000</td>"));
   CHECK_THROWS_AS(runs_report({first.path()}), UsageError);
   CHECK_THROWS_AS(runs_report({first.path(), first.path() / "none"}), DataError);
 }

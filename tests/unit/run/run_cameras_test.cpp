@@ -14,6 +14,7 @@
 #include "raysplats/io.hpp"
 #include "run/run_folder.hpp"
 #include "scene/camera_model.hpp"
+#include "unit/log_capture.hpp"
 #include "unit/temporary_directory.hpp"
 #include "unit/text.hpp"
 
@@ -139,9 +140,12 @@ TEST_CASE("models of no run have no cameras, and damaged files are told") {
     std::ofstream(run / "cameras.json") << text;
     return run_cameras(model_of(run));
   };
+  const LogCapture log;
   CHECK(read("[]").empty());
   CHECK(read("[{" + sound + "}]").at(0).model == CameraModel::kEquirectangular);
+  CHECK(log.lines() == 0);
   CHECK(read("[{\"fx\":5,\"fy\":5," + sound + "}]").at(0).model == CameraModel::kPinhole);
+  CHECK(log.contains("cameras.json names no lenses or principal points"));
   for (const char* text :
        {"", "[", "[1]", "[{}]", "[{\"position\":[0,0]}]",
         R"([{"position":[0,0,0],"rotation":[[1,0,0],[0,1,0],[0,0,0]],"width":8,"height":6}])",

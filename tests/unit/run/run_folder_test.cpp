@@ -7,9 +7,13 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
+
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
 
 using namespace raysplats;
 
@@ -85,6 +89,21 @@ TEST_CASE("a folder knows its newest model, and what a run that goes on has said
   run.begin_metrics(0);
   CHECK(run.former_rows().empty());
   CHECK(run.former_metrics()->is_null());
+}
+
+TEST_CASE("the model of a run that diverged is kept, and its whole Gaussians can be read") {
+  const TemporaryDirectory folder;
+  Gaussians model;
+  model.resize(3);
+  model.means = {0, 1, 2, 3, 4, 5, 6, 7, 8};
+  model.opacities[1] = std::numeric_limits<float>::quiet_NaN();
+  const RunFolder run(folder.path());
+  run.write_model(model, TraceOptions{}, 7);
+  const std::filesystem::path file = folder / "point_cloud/iteration_7/point_cloud.ply";
+  CHECK(run.newest_model() == 7);
+  CHECK_THROWS_AS(read_ply(file), DataError);
+  CHECK(read_ply(file, true).means == std::vector<float>{0, 1, 2, 6, 7, 8});
+  CHECK_THROWS_AS(write_ply(folder / "a.ply", model), DataError);
 }
 
 TEST_CASE("rows of an older metrics.csv stay when its run goes on") {

@@ -314,6 +314,9 @@ TEST_CASE("a number beyond a bound that goes without saying is told the bound") 
   write_text_file(path, "prune-scale-min = 1e300\n");
   CHECK(message_of(path).find("needs a number of at least 0 and at most 1e+30, not") !=
         std::string::npos);
+  write_text_file(path, "scale-min = 1e30\n");
+  CHECK(message_of(path).find("'scale-min' needs a number from 0 to 1000000, not") !=
+        std::string::npos);
   write_text_file(path, "prune-scale-min = -1\n");
   CHECK(message_of(path).find("needs a number of at least 0, not '-1'") != std::string::npos);
   std::filesystem::remove(path);

@@ -111,3 +111,24 @@ TEST_CASE("camera: looking along up still gives a rotation") {
     CHECK(close(camera.center(), {5, 5, 5}));
   }
 }
+
+TEST_CASE("camera: look_at takes up of any length, and refuses what gives no direction") {
+  const glm::dvec3 eye(1, 2, 3), target(-4, 0, 5), up(0.1, 0.2, 1);
+  const Camera camera = look_at(eye, target, up, 10, 10, 10);
+  for (const double length : {1e-12, 1e12}) {
+    const Camera other = look_at(eye, target, length * up, 10, 10, 10);
+    for (int k = 0; k < 3; ++k) CHECK(close(other.rotation[k], camera.rotation[k]));
+  }
+  check_rotation(look_at(eye, target, {0, 0, 0}, 10, 10, 10).rotation);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double inf = std::numeric_limits<double>::infinity();
+  CHECK_THROWS_AS(look_at(eye, eye, up, 10, 10, 10), UsageError);
+  CHECK_THROWS_AS(look_at({0, 0, 1e-200}, {0, 0, 0}, up, 10, 10, 10), UsageError);
+  CHECK_THROWS_AS(look_at({1e200, 0, 0}, target, up, 10, 10, 10), UsageError);
+  for (const double odd : {nan, inf}) {
+    CHECK_THROWS_AS(look_at({odd, 0, 0}, target, up, 10, 10, 10), UsageError);
+    CHECK_THROWS_AS(look_at(eye, {0, odd, 0}, up, 10, 10, 10), UsageError);
+    CHECK_THROWS_AS(look_at({odd, 0, 0}, {odd, 0, 0}, up, 10, 10, 10), UsageError);
+    CHECK_THROWS_AS(look_at(eye, target, {0, 0, odd}, 10, 10, 10), UsageError);
+  }
+}

@@ -189,6 +189,15 @@ TEST_CASE("a fisheye orbit sees what fisheye photos see") {
   CHECK(field_of_view(flat, CameraModel::kFisheye) == doctest::Approx(90.0));
 }
 
+TEST_CASE("an orbit around what panoramas saw has the usual angle") {
+  Camera photo = look_at({0, 0, -4}, {0, 0, 0}, {0, -1, 0}, 200, 100, 0.0);
+  for (const CameraModel without : {CameraModel::kEquirectangular, CameraModel::kOrthographic}) {
+    photo.model = without;
+    for (const CameraModel as : {CameraModel::kPinhole, CameraModel::kFisheye})
+      CHECK(field_of_view(photo, as) == OrbitOptions().fov_degrees);
+  }
+}
+
 TEST_CASE("up, distance and elevation come from the cameras") {
   OrbitOptions options;
   options.frames = 12;

@@ -64,6 +64,14 @@ TEST_CASE("large photos are reduced to a size that trainers expect, or that a ti
   sized(1920, 1080);
   dataset.views[4].camera.width = 8000;
   CHECK(factor() == 1.0);
+  // A strip keeps as many pixels as others, not a height of nothing.
+  sized(16000, 2000);
+  CHECK(factor() == 5.0);
+  CHECK(choose_quality(Quality::kHigh, dataset, DeviceType::kCpu).downscale == 5);
+  sized(2000, 16000);
+  CHECK(factor() == 5.0);
+  sized(8000, 4000);
+  CHECK(factor() == 5.0);
   sized(480, 270);
   CHECK(factor(5.0) == 1.0);
   CHECK(factor(1.0) == 1.0);

@@ -85,7 +85,7 @@ TEST_CASE("a run by time names its length, and a replay of its configuration giv
   options.trace.deterministic = true;
   Trainer trainer(shared_test_context(), load_dataset(data), options, run);
   CHECK_THROWS_AS(trainer.fit_time(0), UsageError);
-  for (const double endless : {HUGE_VAL, std::nan("")}) {
+  for (const double endless : {HUGE_VAL, 1e300, std::nan("")}) {
     CHECK_THROWS_AS(trainer.fit_time(endless), UsageError);
     CHECK_THROWS_AS(trainer.estimate(endless), UsageError);
   }

@@ -92,6 +92,31 @@ TEST_CASE("steps of one's own train as a run does") {
   CHECK(row.psnr == doctest::Approx(summary.evaluations.back().psnr).epsilon(0.01));
 }
 
+TEST_CASE("test photos are read once in a run where the budget has room for them") {
+  Photos photos;
+  TrainOptions options = small_options();
+  const Image black(32, 28, 3);
+  for (const bool room : {true, false}) {
+    CAPTURE(room);
+    options.image_budget = room ? 1 : 0;
+    const View& view = photos.dataset.views.front();
+    REQUIRE(view.test);
+    const Image photo = read_image(view.image_path);
+    Trainer trainer(photos.context, photos.dataset, options,
+                    photos.folder / (room ? "roomy" : "narrow"));
+    trainer.step(2);
+    const EvaluationRow first = trainer.evaluate();
+    write_image(view.image_path, black);
+    const EvaluationRow second = trainer.evaluate();
+    CHECK((second.psnr == first.psnr) == room);
+    CHECK((second.ssim == first.ssim) == room);
+    write_image(view.image_path, photo);
+    const EvaluationRow third = trainer.evaluate();
+    CHECK(third.psnr == first.psnr);
+    CHECK(third.ssim == first.ssim);
+  }
+}
+
 TEST_CASE("what is saved in a callback is what a run goes on from") {
   Photos photos;
   const TrainOptions options = small_options();
