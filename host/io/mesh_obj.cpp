@@ -90,13 +90,19 @@ void check_corner(std::string_view word, const TextReader& reader) {
   reader.fail(fmt::format("a corner is '{}', not whole numbers such as 1/2/3", excerpt(word)));
 }
 
+/// What tinyobjloader does not tell.
+struct Lines {
+  bool colors = false;             // of vertices: red, green and blue behind their coordinates
+  std::vector<std::string> names;  // by which usemtl calls materials, in order: some versions give
+                                   // a name only up to its first blank
+};
+
 /// Checks the numbers of the lines v, vt, vn and f: tinyobjloader reads what is no number as 0.
-/// Reads the material files on the way, unless the file stands alone. Whether vertices have
-/// colours: red, green and blue behind their coordinates.
-bool check_lines(std::span<const std::byte> bytes,
-                 const std::filesystem::path& path,
-                 bool alone,
-                 MtlMaterials& materials) {
+/// Reads the material files on the way, unless the file stands alone.
+Lines check_lines(std::span<const std::byte> bytes,
+                  const std::filesystem::path& path,
+                  bool alone,
+                  MtlMaterials& materials) {
   TextReader reader(bytes, path);
   const auto check = [&](const char* what, int count) {
     for (int i = 0; i < count; ++i) {
@@ -104,13 +110,13 @@ bool check_lines(std::span<const std::byte> bytes,
       reader.fail(fmt::format("{} is not finite", what));
     }
   };
-  bool colors = false;
+  Lines out;
   while (reader.next_line()) {
     const std::string_view key = reader.word();
     if (key == "v") {
       check("a coordinate of the vertex", 3);
-      for (int i = 0; i < 2 && !colors; ++i) reader.word();
-      colors = colors || !reader.word().empty();
+      for (int i = 0; i < 2 && !out.colors; ++i) reader.word();
+      out.colors = out.colors || !reader.word().empty();
     } else if (key == "vn") {
       check("a coordinate of the normal", 3);
     } else if (key == "vt") {
@@ -127,9 +133,11 @@ bool check_lines(std::span<const std::byte> bytes,
       }
     } else if (key == "mtllib" && !alone) {
       materials.add_library(reader.rest());
+    } else if (key == "usemtl") {
+      if (const std::string_view name = reader.rest(); !name.empty()) out.names.emplace_back(name);
     }
   }
-  return colors;
+  return out;
 }
 
 /// A stream of bytes that stay where they are.
@@ -155,8 +163,14 @@ struct CornerHash {
 /// What tinyobjloader calls back: collects the lines of the file in order.
 class Collector {
  public:
-  Collector(const std::filesystem::path& path, bool alone, MtlMaterials& materials)
-      : path_(path), materials_(materials), builder_(path, alone ? kMostAlone : kMostTogether) {}
+  Collector(const std::filesystem::path& path,
+            bool alone,
+            std::span<const std::string> names,
+            MtlMaterials& materials)
+      : path_(path),
+        names_(names),
+        materials_(materials),
+        builder_(path, alone ? kMostAlone : kMostTogether) {}
 
   static tinyobj::callback_t callbacks() {
     tinyobj::callback_t calls;
@@ -174,8 +188,7 @@ class Collector {
       static_cast<Collector*>(self)->add_face(std::span(corners, static_cast<std::size_t>(count)));
     };
     calls.usemtl_cb = [](void* self, const char* name, int) {
-      static_cast<Collector*>(self)->material_ = name;
-      static_cast<Collector*>(self)->material_index_.reset();
+      static_cast<Collector*>(self)->use_material(*name != '\0');
     };
     return calls;
   }
@@ -202,6 +215,12 @@ class Collector {
     std::size_t corners;
     std::uint32_t material;
   };
+
+  void use_material(bool is_named) {
+    material_ = is_named && !names_.empty() ? names_.front() : std::string();
+    if (is_named && !names_.empty()) names_ = names_.subspan(1);
+    material_index_.reset();
+  }
 
   void add_face(std::span<const tinyobj::index_t> corners) {
     if (corners.size() < 3) {
@@ -254,6 +273,7 @@ class Collector {
   }
 
   std::filesystem::path path_;
+  std::span<const std::string> names_;  // that are still to come
   MtlMaterials& materials_;
   MeshBuilder builder_;
   std::vector<std::array<float, 3>> positions_;
@@ -273,8 +293,8 @@ MeshFile read_obj(MeshBytes source) {
   const std::filesystem::path& path = source.path;
   normalize(bytes, path);
   MtlMaterials materials(path, source.seen);
-  const bool colors = check_lines(bytes, path, source.alone, materials);
-  Collector collector(path, source.alone, materials);
+  const Lines lines = check_lines(bytes, path, source.alone, materials);
+  Collector collector(path, source.alone, lines.names, materials);
   ByteStream buffer(bytes);
   std::istream stream(&buffer);
   std::string warnings;
@@ -291,7 +311,7 @@ MeshFile read_obj(MeshBytes source) {
   const bool seen = std::any_of(
       file.materials.begin(), file.materials.end(),
       [&](const Material& material) { return !source.seen || source.seen(material.name); });
-  if (colors && seen) {
+  if (lines.colors && seen) {
     spdlog::warn("{}: the colours of its vertices are left out: it has those of its materials",
                  path.string());
   }

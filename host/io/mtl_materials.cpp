@@ -6,6 +6,7 @@
 #include <tiny_obj_loader.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -80,6 +81,31 @@ std::string trimmed(std::string_view text) {
   return std::string(text.substr(first, text.find_last_not_of(kBlanks) - first + 1));
 }
 
+/// The text of a material file with numbers for the names of its materials, which go to `names`:
+/// some versions of tinyobjloader end a name at its first blank.
+std::string with_numbers(std::string_view text, std::vector<std::string>& names) {
+  constexpr std::string_view kKey = "newmtl";
+  std::string out;
+  out.reserve(text.size());
+  while (!text.empty()) {
+    const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
+    const std::string_view line = text.substr(0, end);
+    const std::size_t key = std::min(line.find_first_not_of(" \t"), line.size());
+    std::string_view name = line.substr(key);
+    const bool is_new = name.starts_with(kKey);
+    if (is_new) name.remove_prefix(kKey.size());
+    if (is_new && (name.starts_with(' ') || name.starts_with('\t')) && !trimmed(name).empty()) {
+      out += fmt::format("{} {}", kKey, names.size());
+      names.push_back(trimmed(name));
+    } else {
+      out += line;
+    }
+    out += text.substr(end, 1);
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return out;
+}
+
 /// Files written on Windows separate folders by backslashes.
 std::filesystem::path relative_to(const std::filesystem::path& file, std::string name) {
   std::replace(name.begin(), name.end(), '\\', '/');
@@ -113,15 +139,18 @@ void MtlMaterials::read_library(const std::filesystem::path& path) {
   std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   // tinyobjloader would miss the first line.
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  std::istringstream stream{std::string(text)};
+  std::vector<std::string> names;
+  std::istringstream stream{with_numbers(text, names)};
   std::map<std::string, int> indices;
   std::vector<tinyobj::material_t> read;
   std::string warnings;
   std::string errors;
   tinyobj::LoadMtl(&indices, &read, &stream, &warnings, &errors);
   for (const tinyobj::material_t& mtl : read) {
-    const std::string name = trimmed(mtl.name);
-    if (name.empty() || known_.contains(name)) continue;
+    std::size_t number = names.size();
+    std::from_chars(mtl.name.data(), mtl.name.data() + mtl.name.size(), number);
+    if (number >= names.size() || known_.contains(names[number])) continue;
+    const std::string& name = names[number];
     Material material = map_material(mtl);
     material.name = name;
     known_.emplace(name, std::move(material));

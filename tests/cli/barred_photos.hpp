@@ -10,7 +10,7 @@
 
 /// A data set of five wide photos between black bars.
 inline void write_barred_photos(const TemporaryFolder& folder) {
-  constexpr int kWidth = 500, kHeight = 40, kBar = 6;
+  constexpr int kWidth = 500, kHeight = 260, kBar = 40;
   std::string frames;
   for (int photo = 0; photo < 5; ++photo) {
     raysplats::Image image(kWidth, kHeight, 3);

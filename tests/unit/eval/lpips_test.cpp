@@ -5,7 +5,6 @@
 
 #include <filesystem>
 #include <fstream>
-#include <optional>
 #include <string>
 
 #include "raysplats/error.hpp"
@@ -83,6 +82,18 @@ double expected_distance(const Image& a, const Image& b) {
   return sum / (3.0 * a.width * a.height);
 }
 
+// What the networks beside it compute.
+double mean_square(const Image& a, const Image& b, bool divided) {
+  constexpr double kScale[3] = {0.458, 0.448, 0.45};
+  double sum = 0;
+  for (std::size_t i = 0; i < a.data.size(); ++i) {
+    const double d = 2.0 * (static_cast<double>(a.data[i]) - static_cast<double>(b.data[i])) /
+                     (divided ? kScale[i % 3] : 1.0);
+    sum += d * d;
+  }
+  return sum / static_cast<double>(a.data.size());
+}
+
 Image random_image(int width, int height, std::uint64_t seed) {
   Image image(width, height, 3);
   CounterRng rng(seed, 0);
@@ -116,28 +127,26 @@ TEST_CASE("lpips: a missing or broken network is refused") {
 
 TEST_CASE("lpips: networks that OpenCV computes wrongly are refused with a remedy") {
   SKIP_TEST_UNLESS(Lpips::available(), "LPIPS is not part of this build");
-  const auto message = [](const auto& act) {
-    try {
-      act();
-    } catch (const DataError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
-  };
+  const Image a = random_image(9, 12, 1), b = random_image(9, 12, 2);
   for (const char* name : {"divisor", "means", "root"}) {
     CAPTURE(name);
-    const bool is_read = std::string(name) == "root";
     const std::filesystem::path path = kData / ("tiny_lpips_" + std::string(name) + ".onnx");
-    std::optional<Lpips> lpips;
-    const std::string reading = message([&] { lpips.emplace(path); });
-    REQUIRE(lpips.has_value() == is_read);
-    const std::string said =
-        is_read ? message([&] { lpips->distance(random_image(9, 12, 1), random_image(9, 12, 2)); })
-                : reading;
+    std::string said;
+    try {
+      Lpips lpips(path);
+      const double distance = lpips.distance(a, b);
+      // Newer versions of OpenCV read some of them rightly.
+      CHECK(std::string(name) != "root");
+      CHECK(distance ==
+            doctest::Approx(mean_square(a, b, std::string(name) == "divisor")).epsilon(1e-5));
+      continue;
+    } catch (const DataError& error) {
+      said = error.what();
+    }
     INFO(said);
     CHECK(said.find(path.string()) != std::string::npos);
     CHECK(said.find("scripts/quality/export_lpips.py") != std::string::npos);
-    CHECK((said.find("no finite number") != std::string::npos) == is_read);
+    CHECK((said.find("no finite number") != std::string::npos) == (std::string(name) == "root"));
   }
 }
 

@@ -263,7 +263,8 @@ TEST_CASE("OBJ: hostile numbers of an MTL stay in range") {
 
 TEST_CASE("OBJ: materials by use, missing ones become the default") {
   const std::string mtl =
-      "newmtl red\nKd 1 0 0\nnewmtl not used\nmap_Kd none.png\nnewmtl my blue\nKd 0 0 1\n";
+      "newmtl red\nKd 1 0 0\nnewmtl not used\nmap_Kd none.png\nnewmtl my green\nKd 0 1 0\n"
+      "newmtl my blue\nKd 0 0 1\n";
   const io::MeshFile file = read("mtllib m.mtl\n" + kSquare +
                                      "f 1 2 3\nusemtl my blue \nf 1 2 3\nusemtl red\nf 1 2 3\n"
                                      "usemtl gone\nf 1 2 3\nusemtl my blue\nf 1 2 4\n",
