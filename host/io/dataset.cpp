@@ -331,7 +331,7 @@ std::optional<io::PhotoFolder> copies_at(const Dataset& dataset, double downscal
 
 /// Whether views have the same photos at either size.
 bool shares_photos(const Dataset& dataset, double one, double other) {
-  return one == other || (!copies_at(dataset, one) && !copies_at(dataset, other));
+  return !copies_at(dataset, one) && !copies_at(dataset, other);
 }
 
 /// By what the photos of a data set that was read at a size are divided in their files.
@@ -406,9 +406,9 @@ Dataset io::load_sized_dataset(const fs::path& path,
     const double read = options.downscale;
     options.downscale = choose(dataset, factor_in_files(dataset, read));
     check_downscale(options.downscale);
-    if (!shares_photos(dataset, read, options.downscale)) {
+    if (options.downscale != read && !shares_photos(dataset, read, options.downscale)) {
       dataset = read_views(path, root, options);
-    } else {
+    } else if (options.downscale != read) {
       for (View& view : dataset.views)
         view.camera = io::picture_camera(view.source_camera, options.downscale, options.undistort);
     }

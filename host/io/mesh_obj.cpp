@@ -188,7 +188,9 @@ class Collector {
       static_cast<Collector*>(self)->add_face(std::span(corners, static_cast<std::size_t>(count)));
     };
     calls.usemtl_cb = [](void* self, const char* name, int) {
-      static_cast<Collector*>(self)->use_material(*name != '\0');
+      // Nameless lines may end in blanks.
+      const bool is_named = std::string_view(name).find_first_not_of(' ') != std::string_view::npos;
+      static_cast<Collector*>(self)->use_material(is_named);
     };
     return calls;
   }

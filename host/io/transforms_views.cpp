@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -67,6 +68,18 @@ std::map<fs::path, std::string> photos_in_place(
   return out;
 }
 
+/// What frames name as masks and depth maps: the photo of none.
+std::set<fs::path> other_pictures(const TransformsFile& file) {
+  std::set<fs::path> out;
+  for (const TransformsFrame& frame : file.frames) {
+    for (const std::string& name : {frame.mask_path, frame.depth_path}) {
+      if (!name.empty())
+        out.insert(find_beside(file.path.parent_path(), name, 2).lexically_normal());
+    }
+  }
+  return out;
+}
+
 /// The photos of a file's frames; frames without one leave the file. A photo that is where another
 /// frame says is none that was moved or converted: that of a frame which finds no other is missing.
 std::vector<FramePhoto> frame_photos(TransformsFile& file) {
@@ -75,10 +88,13 @@ std::vector<FramePhoto> frame_photos(TransformsFile& file) {
   std::vector<std::optional<FramePhoto>> hits;
   for (const TransformsFrame& frame : file.frames) hits.push_back(frame_photo(file, frame));
   const std::map<fs::path, std::string> in_place = photos_in_place(file, hits);
+  const std::set<fs::path> others = other_pictures(file);
   for (std::size_t i = 0; i < hits.size(); ++i) {
     TransformsFrame& frame = file.frames[i];
     std::optional<FramePhoto>& photo = hits[i];
-    if (photo && photo->reformatted && in_place.contains(photo->path)) photo.reset();
+    if (photo && photo->reformatted &&
+        (in_place.contains(photo->path) || others.contains(photo->path.lexically_normal())))
+      photo.reset();
     if (photo && photo->moved) {
       const auto owner = in_place.find(photo->path);
       if (owner != in_place.end() && !may_be_same(owner->second, frame.file_path)) photo.reset();

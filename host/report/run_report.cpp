@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "io/image_file.hpp"
 #include "io/json_file.hpp"
 #include "raysplats/io.hpp"
 #include "report/camera_map.hpp"
@@ -250,7 +251,10 @@ std::vector<fs::path> report_inputs(const fs::path& run) {
   // Pictures have names that only metrics.json beside them knows, which may be damaged.
   const fs::path evaluation = pictures_of(run, objects(metrics_of(run), "evaluations"));
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(evaluation, error)) files.push_back(entry.path());
+  for (const auto& entry : fs::directory_iterator(evaluation, error)) {
+    if (entry.path().filename() == "metrics.json" || io::has_image_extension(entry.path()))
+      files.push_back(entry.path());
+  }
   return files;
 }
 

@@ -92,6 +92,8 @@ TEST_CASE("a quality reduces copies that are all there is of the photos") {
   CHECK(contains(outcome.err, "Photos are reduced 6 times each way"));
   CHECK(value_of(run, "downscale") == "6");
   CHECK(contains(read_file(run + "/cameras.json"), "\"width\":167"));
+  succeed({"train", folder.path().string(), "-o", run, "--resume", run, "-n", "3"});
+  CHECK(contains(read_file(run + "/cameras.json"), "\"width\":167"));
 }
 
 TEST_CASE("a command with a quality or a time begins a run, and goes on with it") {

@@ -242,6 +242,11 @@ TEST_CASE("photos are found with another extension, unless two are, or a frame h
   const LogCapture log;
   CHECK(load_dataset(other.path()).views.size() == 2);
   CHECK(log.contains("'a.jpg' of frame 1"));
+  const Scratch masked;
+  write_scene(masked, {"a.jpg\", \"mask_path\": \"a.png", "b.png", "c.png"},
+              {"a.png", "b.png", "c.png"});
+  CHECK(load_dataset(masked.path()).views.size() == 2);
+  CHECK(log.contains("'a.jpg' of frame 0"));
 }
 
 TEST_CASE("intrinsics of another size than the photos' are warned of") {

@@ -278,6 +278,13 @@ TEST_CASE("OBJ: materials by use, missing ones become the default") {
   CHECK(file.materials[3].color == Material{}.color);
   CHECK(file.textures.empty());
 
+  // A line without a name means the default.
+  const io::MeshFile nameless = read(
+      "mtllib m.mtl\n" + kSquare + "usemtl \r\nf 1 2 3\nusemtl  \nf 1 2 3\nusemtl red\nf 1 2 4\n",
+      mtl);
+  CHECK(nameless.mesh.materials == std::vector<std::uint32_t>{0, 0, 1});
+  CHECK(nameless.materials.at(1).color == Rgb{1, 0, 0});
+
   const io::MeshFile lonely = read("mtllib absent.mtl\n" + kSquare + "usemtl x\nf 1 2 3\n");
   REQUIRE(lonely.materials.size() == 1);
   CHECK(lonely.materials[0].name == "x");

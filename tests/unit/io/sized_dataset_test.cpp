@@ -87,6 +87,9 @@ Dataset check_chosen(const Scratch& scratch, double factor, bool undistort = tru
   const Dataset chosen = io::load_sized_dataset(scratch.path(), options, choose);
   options.downscale = factor;
   check_equal(chosen, load_dataset(scratch.path(), options));
+  // Also where it was read at that size.
+  const auto keep = [&](const Dataset&, double) { return factor; };
+  check_equal(chosen, io::load_sized_dataset(scratch.path(), options, keep));
   return chosen;
 }
 
