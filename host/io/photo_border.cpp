@@ -408,6 +408,7 @@ std::vector<std::vector<View*>> clips_of(const std::vector<View*>& photos) {
   });
   if (!tell || folders.size() > kMostFolders) return {photos};
   std::vector<std::vector<View*>> out;
+  out.reserve(folders.size());
   for (auto& [folder, clip] : folders) out.push_back(std::move(clip));
   return out;
 }
