@@ -56,7 +56,7 @@ unmount() {
   for place in "${mounted[@]}"; do umount "$place"; done
 }
 trap unmount EXIT
-for place in proc dev sys; do
+for place in proc dev dev/pts dev/shm sys; do
   mount --bind "/$place" "$root/$place"
   mounted=("$root/$place" "${mounted[@]}")
 done
