@@ -2,18 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 # Builds what is committed here in a Debian or Ubuntu of another release, with the compiler, libraries and OpenCL of that
 # release, and runs a command there. The release is installed into a folder by debootstrap; nothing else of this system changes.
-# usage: scripts/other_system.sh RELEASE [--folder DIR] [COMMAND [ARGUMENT ...]]
+# usage: scripts/other_system.sh RELEASE [--folder DIR] [--mirror URL] [--keyring FILE] [--components LIST] [COMMAND [ARGUMENT ...]]
 #   RELEASE       as debootstrap names it: trixie, noble, ...
 #   --folder DIR  keeps the system and the build for the next call (default: ~/.cache/raysplats-systems)
+#   --mirror URL, --keyring FILE, --components LIST
+#                 where packages come from, the keys that they are signed with and the parts of the archive: debootstrap needs to
+#                 be told of another distribution's (Ubuntu: the keys of its package ubuntu-keyring; main,universe)
 #   COMMAND       runs in the root of the source tree there (default: scripts/test.sh)
 # For instance: scripts/other_system.sh trixie scripts/quickstart.sh
-# Needs root (chroot, mounts), debootstrap, the keys of the release's distribution (debian-archive-keyring, ubuntu-keyring), and
-# 4 GB for each release.
+# Needs root (chroot, mounts), debootstrap, and 4 GB for each release.
 set -euo pipefail
 called_from=$PWD
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-usage='scripts/other_system.sh RELEASE [--folder DIR] [COMMAND [ARGUMENT ...]]'
+usage='scripts/other_system.sh RELEASE [--folder DIR] [--mirror URL] [--keyring FILE] [--components LIST] [COMMAND [ARGUMENT ...]]'
 fail() {
   printf '%s\n' "$*" >&2
   exit 2
@@ -25,11 +27,19 @@ say() { printf '== %s\n' "$*"; }
 release=$1
 shift
 folder=${XDG_CACHE_HOME:-$HOME/.cache}/raysplats-systems
-if [[ ${1:-} == --folder ]]; then
-  (($# > 1)) || fail '--folder needs a value'
-  folder=$(cd "$called_from" && realpath -m -- "$2")
+given=()
+mirror=()
+while [[ ${1:-} == --* ]]; do
+  (($# > 1)) || fail "$1 needs a value"
+  case $1 in
+    --folder) folder=$(cd "$called_from" && realpath -m -- "$2") ;;
+    --mirror) mirror=("$2") ;;
+    --keyring) given+=(--keyring="$(cd "$called_from" && realpath -m -- "$2")") ;;
+    --components) given+=(--components="$2") ;;
+    *) fail "$1 is no option: $usage" ;;
+  esac
   shift 2
-fi
+done
 command=("$@")
 ((${#command[@]} > 0)) || command=(scripts/test.sh)
 
@@ -43,7 +53,7 @@ if [[ ! -e $root/.complete ]]; then
   say "Installing $release into $root"
   rm -rf --one-file-system "$root"
   mkdir -p "$folder"
-  debootstrap --variant=minbase "$release" "$root" >"$folder/$release.log" 2>&1 || {
+  debootstrap "${given[@]}" --variant=minbase "$release" "$root" "${mirror[@]}" >"$folder/$release.log" 2>&1 || {
     tail -n 5 "$folder/$release.log" >&2
     exit 1
   }
