@@ -318,7 +318,7 @@ Dataset read_views(const fs::path& path, const fs::path& root, const DatasetOpti
     throw DataError(
         fmt::format("The data set {} has no views: there is nothing to train on", root.string()));
   }
-  io::part_held_out(dataset.views);
+  io::settle_repeated_photos(dataset.views);
   return dataset;
 }
 
@@ -346,7 +346,6 @@ double factor_in_files(const Dataset& dataset, double downscale) {
 
 /// Finds what photos that are decoded tell of all of them, and warns of what they do not say.
 void look_at_photos(Dataset& dataset, const DatasetOptions& options) {
-  io::warn_of_repeated_photos(dataset.views);
   io::warn_of_color_profiles(dataset.views);
   io::warn_of_folding_lenses(dataset.views);
   io::warn_of_principal_points(dataset.views);
@@ -402,15 +401,15 @@ Dataset io::load_sized_dataset(const fs::path& path,
                                 is_file(root) ? "is a file" : "does not exist"));
   }
   Dataset dataset = read_views(path, root, options);
-  if (choose) {
-    const double read = options.downscale;
-    options.downscale = choose(dataset, factor_in_files(dataset, read));
+  const double read = options.downscale;
+  if (choose) options.downscale = choose(dataset, factor_in_files(dataset, read));
+  if (options.downscale != read) {
     check_downscale(options.downscale);
-    if (options.downscale != read && !shares_photos(dataset, read, options.downscale)) {
-      dataset = read_views(path, root, options);
-    } else if (options.downscale != read) {
+    if (shares_photos(dataset, read, options.downscale)) {
       for (View& view : dataset.views)
         view.camera = io::picture_camera(view.source_camera, options.downscale, options.undistort);
+    } else {
+      dataset = read_views(path, root, options);
     }
   }
   look_at_photos(dataset, options);

@@ -219,9 +219,11 @@ class Collector {
   };
 
   void use_material(bool is_named) {
-    material_ = is_named && !names_.empty() ? names_.front() : std::string();
-    if (is_named && !names_.empty()) names_ = names_.subspan(1);
+    material_.clear();
     material_index_.reset();
+    if (!is_named || names_.empty()) return;
+    material_ = names_.front();
+    names_ = names_.subspan(1);
   }
 
   void add_face(std::span<const tinyobj::index_t> corners) {

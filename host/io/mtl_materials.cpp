@@ -10,6 +10,7 @@
 #include <cmath>
 #include <limits>
 #include <sstream>
+#include <utility>
 
 #include "io/byte_reader.hpp"
 #include "io/text_reader.hpp"
@@ -91,14 +92,17 @@ std::string with_numbers(std::string_view text, std::vector<std::string>& names)
     const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
     const std::string_view line = text.substr(0, end);
     const std::size_t key = std::min(line.find_first_not_of(" \t"), line.size());
-    std::string_view name = line.substr(key);
-    const bool is_new = name.starts_with(kKey);
-    if (is_new) name.remove_prefix(kKey.size());
-    if (is_new && (name.starts_with(' ') || name.starts_with('\t')) && !trimmed(name).empty()) {
-      out += fmt::format("{} {}", kKey, names.size());
-      names.push_back(trimmed(name));
-    } else {
+    std::string_view rest = line.substr(key);
+    std::string name;
+    if (rest.starts_with(kKey)) {
+      rest.remove_prefix(kKey.size());
+      if (rest.starts_with(' ') || rest.starts_with('\t')) name = trimmed(rest);
+    }
+    if (name.empty()) {
       out += line;
+    } else {
+      out += fmt::format("{} {}", kKey, names.size());
+      names.push_back(std::move(name));
     }
     out += text.substr(end, 1);
     text.remove_prefix(std::min(end + 1, text.size()));

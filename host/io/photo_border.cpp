@@ -53,8 +53,8 @@ constexpr double kLeastAgreement = 0.6;
 constexpr double kMostOffCircle = 0.02;
 constexpr double kLeastRadius = 0.4;
 constexpr double kLeastOnCircle = 0.8;
-// The outline of a body, as a share of its radius: those of turntables miss it by less than 0.04,
-// borders of captures by hand that look around by more than 0.07. And how many points of an edge
+// The outline of a body, as a share of its radius: that of rendered turntables misses it by less,
+// borders painted into captures by hand that look around by more. And how many points of an edge
 // tell.
 constexpr double kLeastMisfit = 0.05;
 constexpr std::size_t kEdgePoints = 16;

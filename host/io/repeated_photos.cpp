@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -112,13 +113,7 @@ std::string both_names(const fs::path& name, const fs::path& other) {
                        : fmt::format("{} under the name {}", name.string(), other.string());
 }
 
-}  // namespace
-
-void part_held_out(std::vector<View>& views) {
-  const auto tests =
-      std::count_if(views.begin(), views.end(), [](const View& v) { return v.test; });
-  if (tests == 0 || tests == std::ssize(views)) return;
-  const Photos photos(views);
+void part_held_out(std::vector<View>& views, const Photos& photos) {
   const std::map<fs::path, fs::path> held_out = names_of(views, true, photos);
   const std::map<fs::path, fs::path> trained = names_of(views, false, photos);
   std::vector<fs::path> shared;
@@ -142,8 +137,7 @@ void part_held_out(std::vector<View>& views) {
   });
 }
 
-void warn_of_repeated_photos(std::span<const View> views) {
-  const Photos photos(views);
+void warn_of_repeated_photos(std::span<const View> views, const Photos& photos) {
   std::map<std::pair<fs::path, bool>, fs::path> seen;
   std::map<fs::path, std::string> repeated;
   for (const View& view : views) {
@@ -155,6 +149,14 @@ void warn_of_repeated_photos(std::span<const View> views) {
   spdlog::warn("{} in more than one frame, {} the first",
                counted(static_cast<double>(repeated.size()), "photo is", "photos are"),
                repeated.begin()->second);
+}
+
+}  // namespace
+
+void settle_repeated_photos(std::vector<View>& views) {
+  const Photos photos(views);
+  part_held_out(views, photos);
+  warn_of_repeated_photos(views, photos);
 }
 
 }  // namespace raysplats::io

@@ -13,8 +13,8 @@ namespace raysplats {
 /// for a folder that is no run or whose files, other than pictures, are damaged.
 std::string run_report(const std::filesystem::path& run);
 
-/// The files of a run that its page is made from, those that are not there among them, and all in
-/// the folder of its last evaluation. Throws DataError as run_report().
+/// The files of a run that its page is made from, those that are not there among them, with all
+/// pictures of its last evaluation. Throws DataError as run_report().
 std::vector<std::filesystem::path> report_inputs(const std::filesystem::path& run);
 
 /// Writes run_report() atomically. Returns one line about the warnings that the page begins with:
