@@ -200,6 +200,13 @@ double median_distance(std::span<const Camera> cameras, const glm::dvec3& point)
   return *middle;
 }
 
+double typical_depth(std::span<const Camera> cameras, const PointCloud& points) {
+  const double extent = scene_extent(cameras, points);
+  // Cameras in one place have no middle to be distant from.
+  const double middle = median_distance(cameras, visible_region(cameras, extent).center);
+  return middle > kOnePlace * extent ? middle : extent;
+}
+
 std::vector<double> subject_distances(std::span<const Camera> cameras,
                                       const PointCloud& points,
                                       double extent) {

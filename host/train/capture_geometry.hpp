@@ -57,6 +57,10 @@ double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point
 /// Median of the distances from the point to the cameras, each at least 1e-6.
 double median_distance(std::span<const Camera> cameras, const glm::dvec3& point);
 
+/// How far away what the cameras look at is, as far as they and the points of the data set tell:
+/// from the middle of their view, or the scene extent where they stand in it.
+double typical_depth(std::span<const Camera> cameras, const PointCloud& points);
+
 /// How far along its axis what a camera sees lies: the median depth of the points before it,
 /// without points the depth of what all cameras look at (common_target()), else `extent`.
 std::vector<double> subject_distances(std::span<const Camera> cameras,

@@ -22,6 +22,7 @@
 #include "train/plane_sweep.hpp"
 #include "train/point_check.hpp"
 #include "train/point_cloud.hpp"
+#include "train/pose_check.hpp"
 #include "train/schedule.hpp"
 
 namespace raysplats {
@@ -76,16 +77,9 @@ Gaussians subset(const Gaussians& model, std::size_t limit) {
   return gathered(model, std::vector<std::uint32_t>(chosen.begin(), chosen.end()));
 }
 
-// How far away what the cameras look at is, as far as they and the points of the data set tell.
-double guessed_depth(std::span<const Camera> cameras, const PointCloud& points) {
-  const double extent = scene_extent(cameras, points);
-  // Cameras in one place have no middle to be distant from.
-  const double middle = median_distance(cameras, visible_region(cameras, extent).center);
-  return middle > 1e-3 * extent ? middle : extent;
-}
-
 // Points that the photos tell of: of a body that is cut out, else of what a sweep finds in
-// `depths`, or in those that it looks for. `unsure`: as of swept_points().
+// `depths`, or in those that it looks for: then nothing else has told that the poses are sound.
+// `unsure`: as of swept_points().
 PointCloud photo_points(const Dataset& dataset,
                         std::span<const Camera> cameras,
                         const Region& region,
@@ -94,21 +88,24 @@ PointCloud photo_points(const Dataset& dataset,
                         std::size_t count,
                         double unsure,
                         std::uint64_t seed) {
-  const double guess = guessed_depth(cameras, dataset.points);
+  const double guess = typical_depth(cameras, dataset.points);
   if (dataset.alpha_is_background) {
+    check_poses(dataset, photos, probe_sweep(photos, depths_around(guess), seed).agreed, seed);
     PointCloud hull = carved_points(photos, region, count, seed);
     if (hull.size() > 0) return hull;
     spdlog::warn("the photos' alpha leaves no common body: the start fills the region instead");
     return scattered_points(photos, region, depths_around(guess), count, seed);
   }
-  if (depths) return swept_points(photos, *depths, count, unsure, seed);
+  if (depths) return swept_points(photos, *depths, count, unsure, seed).points;
   const DepthRange found = swept_depths(photos, guess, seed);
   spdlog::debug(
       "the photos show what is {:.3g} to {:.3g} away, typically {:.3g} ({:.3g} by the "
       "cameras){}",
       found.nearest, found.farthest, found.typical, guess,
       found.open ? "; they leave depths open" : "");
-  return swept_points(photos, found, count, unsure, seed);
+  SweptPoints swept = swept_points(photos, found, count, unsure, seed);
+  check_poses(dataset, photos, swept.agreed, seed);
+  return std::move(swept.points);
 }
 
 // What of the points that photos tell of goes beside sparse ones, and where those that tell it
@@ -142,9 +139,9 @@ Beside photos_beside(const PointCloud& points,
   const double shown = opaque_share(many);
   spdlog::debug("{:.1f} % of the photos count", 100 * shown);
   if (shown < kMostlyShown) return by_points;
-  const double guess = guessed_depth(cameras, dataset.points);
+  const double guess = typical_depth(cameras, dataset.points);
   const DepthRange depths = swept_depths(many, guess, options.seed);
-  const SweepProbe probe = probe_sweep(many, depths, options.seed);
+  const SweptPoints probe = probe_sweep(many, depths, options.seed);
   spdlog::debug("{:.1f} % of what photos show agrees in one depth", 100 * probe.agreed);
   if (probe.agreed <= kMostlyAgreed) return {by_points.part, depths};
   // What has texture enough for a depth has sparse points too, unless they are of another part; a
@@ -405,7 +402,7 @@ Gaussians initial_model(const Dataset& dataset,
   const Region region = visible_region(cameras, scene_extent(cameras, dataset.points));
   if (options.init == "random") {
     return start(scattered_points(photos(PhotoChoice::kAll), region,
-                                  depths_around(guessed_depth(cameras, dataset.points)),
+                                  depths_around(typical_depth(cameras, dataset.points)),
                                   begun.count, options.seed));
   }
   const std::vector<SmallPhoto>& told =

@@ -160,6 +160,10 @@ class Sweep {
   std::size_t agreed() const { return agreed_; }
   /// Samples that show something, in no clear depth.
   std::size_t vague() const { return vague_; }
+  double agreed_share() const {
+    const std::size_t shown = agreed_ + vague_;
+    return shown > 0 ? static_cast<double>(agreed_) / static_cast<double>(shown) : 0.0;
+  }
 
  private:
   std::span<const SmallPhoto> photos_;
@@ -347,26 +351,25 @@ DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::u
   return better ? settled(photos, farther, seed).depths : near.depths;
 }
 
-SweepProbe probe_sweep(std::span<const SmallPhoto> photos,
-                       const DepthRange& depths,
-                       std::uint64_t seed) {
-  SweepProbe out;
+SweptPoints probe_sweep(std::span<const SmallPhoto> photos,
+                        const DepthRange& depths,
+                        std::uint64_t seed) {
+  SweptPoints out;
   if (photos.empty()) return out;
   Sweep sweep(photos, depths, seed);
   sweep.take(kProbes);
-  const std::size_t shown = sweep.agreed() + sweep.vague();
-  if (shown > 0) out.agreed = static_cast<double>(sweep.agreed()) / static_cast<double>(shown);
+  out.agreed = sweep.agreed_share();
   for (const Sample& sample : sweep.samples()) {
     if (sample.agreed) append_point(out.points, sample.position(), sample.color());
   }
   return out;
 }
 
-PointCloud swept_points(std::span<const SmallPhoto> photos,
-                        const DepthRange& depths,
-                        std::size_t count,
-                        double unsure,
-                        std::uint64_t seed) {
+SweptPoints swept_points(std::span<const SmallPhoto> photos,
+                         const DepthRange& depths,
+                         std::size_t count,
+                         double unsure,
+                         std::uint64_t seed) {
   // Photos that tell no depth at all give a start as well, however small it is.
   const auto wanted = static_cast<std::size_t>(unsure * static_cast<double>(count));
   const std::size_t fog = std::min(count, std::max<std::size_t>(unsure > 0 ? 1 : 0, wanted));
@@ -402,8 +405,8 @@ PointCloud swept_points(std::span<const SmallPhoto> photos,
     for (const std::size_t i : as_deep[view])
       taken[i].depth = places.depth_near(taken[i].pixel).value_or(taken[i].depth);
   });
-  PointCloud out;
-  for (const Sample& sample : taken) append_point(out, sample.position(), sample.color());
+  SweptPoints out{sweep.agreed_share(), {}};
+  for (const Sample& sample : taken) append_point(out.points, sample.position(), sample.color());
   return out;
 }
 

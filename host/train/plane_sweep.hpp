@@ -21,17 +21,18 @@ DepthRange depths_around(double typical);
 /// agree about a farther one, as from cameras turned at arm's length. `guess` is positive.
 DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed);
 
-/// What a sweep over a few random pixels finds.
-struct SweepProbe {
+/// What a sweep finds.
+struct SweptPoints {
   /// The share of the pixels, of those that show something, at which neighbouring photos agree in
   /// one depth, which one of them finds as well. 0 where nothing is shown.
   double agreed = 0;
-  PointCloud points;  ///< where they agree
+  PointCloud points;
 };
 
-SweepProbe probe_sweep(std::span<const SmallPhoto> photos,
-                       const DepthRange& depths,
-                       std::uint64_t seed);
+/// A sweep over a few random pixels, and the points where photos agree.
+SweptPoints probe_sweep(std::span<const SmallPhoto> photos,
+                        const DepthRange& depths,
+                        std::uint64_t seed);
 
 /// Points on the rays of random pixels, at the depth where neighbouring photos agree best (a plane
 /// sweep, Collins 1996, over single pixels with their surroundings, which photos are looked up for
@@ -42,10 +43,10 @@ SweepProbe probe_sweep(std::span<const SmallPhoto> photos,
 /// half at random depths, the other as deep as what agreed and is most like them in place and
 /// colour, unless the range is open. Colours are the photos'. Throws Error (kInterrupted) when a
 /// signal is marked (InterruptGuard), as all sweeps do.
-PointCloud swept_points(std::span<const SmallPhoto> photos,
-                        const DepthRange& depths,
-                        std::size_t count,
-                        double unsure,
-                        std::uint64_t seed);
+SweptPoints swept_points(std::span<const SmallPhoto> photos,
+                         const DepthRange& depths,
+                         std::size_t count,
+                         double unsure,
+                         std::uint64_t seed);
 
 }  // namespace raysplats

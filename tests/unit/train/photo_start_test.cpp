@@ -116,7 +116,7 @@ TEST_CASE("photos of other exposures agree once they are balanced") {
         photo_of(look_at({0, y, z}, {4, 0.5 * y, 0.5 * z}, {0, 0, 1}, 96, 72, 90), exposed));
   }
   const auto on_the_wall = [&photos] {
-    const PointCloud points = swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5);
+    const PointCloud points = swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5).points;
     std::size_t near = 0;
     for (std::size_t i = 0; i < points.size(); ++i)
       near += std::abs(points.positions[3 * i] - 4.0f) > 0.5f ? 0 : 1;

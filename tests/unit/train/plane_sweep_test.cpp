@@ -37,8 +37,8 @@ glm::dvec4 ball(const CameraRay& ray, double fineness) {
 
 TEST_CASE("sweeping finds a textured wall and its colours") {
   const std::vector<SmallPhoto> photos = photos_of_wall();
-  const PointCloud points = swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5);
-  CHECK(points.positions == swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5).positions);
+  const PointCloud points = swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5).points;
+  CHECK(points.positions == swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5).points.positions);
   REQUIRE(points.size() >= 300);
   std::size_t near = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -59,7 +59,7 @@ TEST_CASE("half of the pixels that no depth explains are as deep as what is arou
   };
   for (const SmallPhoto& photo : photos_of_wall())
     photos.push_back(photo_of(photo.camera, with_square));
-  const PointCloud points = swept_points(photos, {0.6, 3.0, 30.0}, 600, 0.25, 5);
+  const PointCloud points = swept_points(photos, {0.6, 3.0, 30.0}, 600, 0.25, 5).points;
   std::size_t plain = 0, near = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (std::abs(points.colors[3 * i + 2] - 0.2f) > 0.01f) continue;
@@ -114,7 +114,7 @@ TEST_CASE("photos through long lenses find a wall that a step of the usual lengt
   const DepthRange depths = swept_depths(photos, 60, 3);
   CHECK(depths.typical == 60);
   CHECK(probe_sweep(photos, depths, 5).agreed > 0.3);
-  const PointCloud points = swept_points(photos, depths, 400, 0.25, 5);
+  const PointCloud points = swept_points(photos, depths, 400, 0.25, 5).points;
   std::size_t near = 0;
   for (std::size_t i = 0; i < points.size(); ++i)
     near += std::abs(points.positions[3 * i]) < 0.4f ? 1 : 0;
@@ -138,7 +138,7 @@ TEST_CASE("photos of different things agree in next to no depth") {
 
 TEST_CASE("photos without a common view give no sure points and do not fail") {
   std::vector<SmallPhoto> one{photo_of(look_at({0, 0, 0}, {1, 0, 0}, {0, 0, 1}, 40, 30, 40), wall)};
-  const PointCloud points = swept_points(one, {0.4, 2.0, 20.0}, 100, 0.25, 1);
+  const PointCloud points = swept_points(one, {0.4, 2.0, 20.0}, 100, 0.25, 1).points;
   CHECK(points.size() == 25);
   for (const float p : points.positions) CHECK(std::isfinite(p));
 }
@@ -148,7 +148,7 @@ TEST_CASE("a signal ends a sweep, and the next one is whole") {
   const auto sweep = [&photos] { return swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.25, 5); };
   {
     const InterruptGuard guard;
-    CHECK(sweep().size() > 0);
+    CHECK(sweep().points.size() > 0);
     std::raise(SIGINT);
     ErrorCode code = ErrorCode::kRuntime;
     try {
@@ -158,7 +158,7 @@ TEST_CASE("a signal ends a sweep, and the next one is whole") {
     }
     CHECK(code == ErrorCode::kInterrupted);
   }
-  CHECK(sweep().size() > 0);
+  CHECK(sweep().points.size() > 0);
 }
 
 TEST_CASE("cameras on a tripod look at what is far away") {
@@ -173,7 +173,7 @@ TEST_CASE("cameras on a tripod look at what is far away") {
     const double guess = radius > 0 ? radius : 1.0;
     const DepthRange depths = swept_depths(photos, guess, 3);
     CHECK(depths.open);
-    const PointCloud points = swept_points(photos, depths, 400, 0.25, 3);
+    const PointCloud points = swept_points(photos, depths, 400, 0.25, 3).points;
     CHECK(points.size() > 390);
     std::size_t far = 0;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -215,7 +215,7 @@ TEST_CASE("cameras turned at arm's length find what is around them") {
   const DepthRange depths = swept_depths(photos, 0.4, 3);
   CHECK(!depths.open);
   CHECK(depths.farthest > 9.0);
-  const PointCloud points = swept_points(photos, depths, 400, 0.25, 5);
+  const PointCloud points = swept_points(photos, depths, 400, 0.25, 5).points;
   std::size_t near = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const float* p = points.positions.data() + 3 * i;
@@ -246,7 +246,7 @@ TEST_CASE("cameras close together find what is many times their spread away") {
   const DepthRange depths = swept_depths(photos, 0.14, 3);
   CHECK(!depths.open);
   CHECK(depths.typical > 0.5);
-  const PointCloud points = swept_points(photos, depths, 400, 0.25, 5);
+  const PointCloud points = swept_points(photos, depths, 400, 0.25, 5).points;
   std::size_t near = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const float* p = points.positions.data() + 3 * i;
@@ -270,7 +270,7 @@ TEST_CASE("cameras side by side find the depth of the wall, however far away it 
     CHECK(!depths.open);
     CHECK(depths.typical > 3.5);
     CHECK(depths.typical < 6.5);
-    const PointCloud points = swept_points(photos, depths, 400, 0.25, 5);
+    const PointCloud points = swept_points(photos, depths, 400, 0.25, 5).points;
     std::size_t near = 0;
     for (std::size_t i = 0; i < points.size(); ++i)
       near += std::abs(points.positions[3 * i] - 4.0f) > 0.5f ? 0 : 1;

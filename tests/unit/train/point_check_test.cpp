@@ -177,7 +177,7 @@ TEST_CASE("points on a small part of what photos show are joined by points of th
 TEST_CASE("points of photos that tell of depth stand beside sparse ones, in their places") {
   std::vector<SmallPhoto> photos = photos_of_wall();
   const std::vector<Camera> cameras = cameras_of(photos);
-  const PointCloud found = swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.0, 5);
+  const PointCloud found = swept_points(photos, {0.6, 3.0, 30.0}, 400, 0.0, 5).points;
   const auto count_above = [](double height, const PointCloud& points) {
     std::size_t above = 0;
     for (std::size_t i = 0; i < points.size(); ++i)
