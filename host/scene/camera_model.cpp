@@ -19,6 +19,8 @@ constexpr double kPi = std::numbers::pi;
 // Radius x/z of a kOpenCv lens: 89.94 degrees.
 constexpr double kWidestRadius = 1000.0;
 
+double widest(CameraModel model) { return model == CameraModel::kFisheye ? kPi : kWidestRadius; }
+
 double evaluate(const std::vector<double>& coefficients, double s) {
   double value = 0;
   for (auto c = coefficients.rbegin(); c != coefficients.rend(); ++c) value = value * s + *c;
@@ -60,6 +62,19 @@ double radial_slope(CameraModel model, const Distortion& d, double r) {
   const std::array<double, 4> k = radial_terms(model, d);
   const double s = r * r;
   return 1 + s * (3 * k[0] + s * (5 * k[1] + s * (7 * k[2] + s * 9 * k[3])));
+}
+
+/// Whether a radius or angle is within lens_limit(). That takes the roots of a polynomial, and most
+/// are so near to the axis that what its falling terms alone take off the slope leaves some.
+bool within_limit(const Camera& camera, double r) {
+  const std::array<double, 4> k = radial_terms(camera.model, camera.distortion);
+  const double s = r * r;
+  const double falling =
+      s *
+      (std::min(0.0, 3 * k[0]) +
+       s * (std::min(0.0, 5 * k[1]) + s * (std::min(0.0, 7 * k[2]) + s * std::min(0.0, 9 * k[3]))));
+  if (1 + falling > 0 && r < widest(camera.model)) return true;
+  return r <= lens_limit(camera.model, camera.distortion);
 }
 
 /// Radius or angle in [0, limit] whose image radius is `image`; the nearer end when there is none.
@@ -130,11 +145,10 @@ double radial_image(CameraModel model, const Distortion& d, double r) {
 
 double lens_limit(CameraModel model, const Distortion& d) {
   if (model != CameraModel::kOpenCv && model != CameraModel::kFisheye) return 0;
-  const double widest = model == CameraModel::kFisheye ? kPi : kWidestRadius;
   const std::array<double, 4> k = radial_terms(model, d);
   const std::vector<double> stops =
-      sign_changes({1, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]}, widest * widest);
-  return stops.empty() ? widest : std::sqrt(stops.front());
+      sign_changes({1, 3 * k[0], 5 * k[1], 7 * k[2], 9 * k[3]}, widest(model) * widest(model));
+  return stops.empty() ? widest(model) : std::sqrt(stops.front());
 }
 
 CameraRay camera_ray(const Camera& camera, double px, double py) {
@@ -199,13 +213,11 @@ std::optional<glm::dvec2> project(const Camera& camera, const glm::dvec3& world)
       if (!(p.z > 0)) return std::nullopt;
       return pixels({p.x / p.z, p.y / p.z});
     case CameraModel::kOpenCv:
-      if (!(p.z > 0) || across > p.z * lens_limit(camera.model, camera.distortion))
-        return std::nullopt;
+      if (!(p.z > 0) || !within_limit(camera, across / p.z)) return std::nullopt;
       return pixels(distort(camera.distortion, {p.x / p.z, p.y / p.z}));
     case CameraModel::kFisheye: {
       const double angle = std::atan2(across, p.z);
-      if (glm::length(p) == 0 || angle > lens_limit(camera.model, camera.distortion))
-        return std::nullopt;
+      if (glm::length(p) == 0 || !within_limit(camera, angle)) return std::nullopt;
       if (across == 0) return pixels({0, 0});
       const double image = radial_image(camera.model, camera.distortion, angle);
       return pixels({p.x / across * image, p.y / across * image});

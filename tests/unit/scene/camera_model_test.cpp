@@ -123,6 +123,26 @@ TEST_CASE("camera models: a lens ends where its polynomial stops growing") {
   CHECK_FALSE(project(camera, {0.1, 0, -1}));
 }
 
+TEST_CASE("camera models: no point beyond a lens is seen, all within it are") {
+  CounterRng rng(11, 1);
+  for (int lens = 0; lens < 100; ++lens) {
+    const Distortion d{0.3 * rng.normal(), 0.1 * rng.normal(), 0.03 * rng.normal(), 0, 0,
+                       0.01 * rng.normal()};
+    for (const CameraModel model : {CameraModel::kOpenCv, CameraModel::kFisheye}) {
+      const Camera camera = plain(model, 1000, 1000, 500, d);
+      const double limit = lens_limit(model, d);
+      for (const double share : {0.2, 0.6, 0.9, 0.999, 1.001, 1.1, 2.0}) {
+        const double r = share * limit;
+        const bool fisheye = model == CameraModel::kFisheye;
+        if (fisheye && r > kPi) continue;
+        const glm::dvec3 point =
+            fisheye ? glm::dvec3(std::sin(r), 0, std::cos(r)) : glm::dvec3(r, 0, 1);
+        CHECK(project(camera, point).has_value() == (share < 1));
+      }
+    }
+  }
+}
+
 TEST_CASE("camera models: fisheye reaches behind the camera") {
   const Camera camera = plain(CameraModel::kFisheye, 800, 800, 150);
   // 120 degrees from the axis, downwards.
