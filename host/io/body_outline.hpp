@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <glm/vec2.hpp>
 #include <span>
 
 #include "raysplats/camera.hpp"
 
 namespace raysplats::io {
+
+/// Points that tell enough of an edge.
+inline constexpr std::size_t kOutlinePoints = 16;
+/// Edges that miss the outline of a body by less, as outline_misfit() says, may be one: those of
+/// rendered turntables do, borders painted into captures by hand that look around miss it by more.
+inline constexpr double kMostOutlineMisfit = 0.05;
 
 /// A point of an edge that the photos of several cameras have in the same place.
 struct EdgePoint {

@@ -6,37 +6,25 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
-#include <glm/geometric.hpp>
-#include <glm/mat2x2.hpp>
-#include <glm/matrix.hpp>
 #include <glm/vec2.hpp>
 #include <iterator>
-#include <limits>
 #include <map>
 #include <memory>
 #include <optional>
 #include <span>
-#include <type_traits>
 #include <utility>
-#include <variant>
 
+#include "io/black_edges.hpp"
 #include "io/body_outline.hpp"
-#include "io/image_codec.hpp"
-#include "io/photo_orientation.hpp"
-#include "raysplats/error.hpp"
+#include "io/border_circle.hpp"
 #include "scene/even_choice.hpp"
-#include "scene/photo_lens.hpp"
 #include "util/parallel.hpp"
-#include "util/srgb.hpp"
 
 namespace raysplats::io {
 namespace {
 
 constexpr std::size_t kMostPhotos = 8;
 constexpr std::size_t kLeastPhotos = 3;
-// The black of videos is 16 of 255, and compression adds to it.
-constexpr double kBlack = 24.0 / 255.0;
-constexpr int kLeastDepth = 2;
 // Of the columns or rows that show something, those that a side's border has to cover.
 constexpr double kLeastCover = 0.25;
 // Of all columns or rows, those that show something: a vertical video between bars has a third.
@@ -48,104 +36,12 @@ constexpr double kMostBentDepth = 0.07;
 constexpr std::size_t kBentEnds = 12;
 // Of the columns of all photos, those in which something is shown just where the border ends.
 constexpr double kLeastAgreement = 0.6;
-// The circle of a fisheye: how far ends may lie off it and how large it is at least, as shares of
-// the photo's shorter side, and the share of the ends that lie on it.
-constexpr double kMostOffCircle = 0.02;
-constexpr double kLeastRadius = 0.4;
-constexpr double kLeastOnCircle = 0.8;
-// The outline of a body, as a share of its radius: that of rendered turntables misses it by less,
-// borders painted into captures by hand that look around by more. And how many points of an edge
-// tell.
-constexpr double kLeastMisfit = 0.05;
-constexpr std::size_t kEdgePoints = 16;
 // Folders that photos are told apart by, as several clips lie in.
 constexpr std::size_t kMostFolders = 8;
 // Of a photo: a vertical video with bars on all sides has less.
 constexpr double kMostHidden = 0.85;
 // Of what a border hides of a photo: one that shows more there has none.
 constexpr double kMostShown = 0.1;
-
-enum Side : std::size_t { kTop, kBottom, kLeft, kRight };
-constexpr std::size_t kSides = 4;
-
-// How far a photo is black from each edge, by column or row.
-struct Edges {
-  int width = 0;
-  int height = 0;
-  std::array<std::vector<int>, kSides> depths;
-
-  int depth_of(Side side) const { return side == kTop || side == kBottom ? height : width; }
-  bool is_black() const {
-    const std::vector<int>& columns = depths[kTop];
-    return std::all_of(columns.begin(), columns.end(), [&](int depth) { return depth == height; });
-  }
-};
-
-template <class T>
-class DarkPixels {
- public:
-  DarkPixels(const RawImage& photo, const std::vector<T>& numbers, bool light)
-      : numbers_(numbers),
-        width_(static_cast<std::size_t>(photo.width)),
-        channels_(static_cast<std::size_t>(photo.channels)),
-        colors_(channels_ < 3 ? 1 : 3) {
-    if (light) black_ = light_from_display(black_);
-    if constexpr (std::is_integral_v<T>)
-      black_ *= static_cast<double>(std::numeric_limits<T>::max());
-  }
-  bool dark(int x, int y) const {
-    const std::size_t pixel = static_cast<std::size_t>(y) * width_ + static_cast<std::size_t>(x);
-    const T* number = numbers_.data() + pixel * channels_;
-    return std::all_of(number, number + colors_, [&](T value) { return value <= black_; });
-  }
-
- private:
-  const std::vector<T>& numbers_;
-  std::size_t width_, channels_, colors_;
-  double black_ = kBlack;
-};
-
-template <class T>
-Edges edges_of(const RawImage& photo, const std::vector<T>& numbers, bool light) {
-  const DarkPixels<T> pixels(photo, numbers, light);
-  Edges out{photo.width, photo.height, {}};
-  const auto measure = [&](Side side, int count, const auto& dark) {
-    out.depths[side].resize(static_cast<std::size_t>(count));
-    for (int i = 0; i < count; ++i) {
-      int depth = 0;
-      while (depth < out.depth_of(side) && dark(i, depth)) ++depth;
-      out.depths[side][static_cast<std::size_t>(i)] = depth;
-    }
-  };
-  const int right = photo.width - 1, bottom = photo.height - 1;
-  measure(kTop, photo.width, [&](int i, int j) { return pixels.dark(i, j); });
-  measure(kBottom, photo.width, [&](int i, int j) { return pixels.dark(i, bottom - j); });
-  measure(kLeft, photo.height, [&](int i, int j) { return pixels.dark(j, i); });
-  measure(kRight, photo.height, [&](int i, int j) { return pixels.dark(right - j, i); });
-  return out;
-}
-
-// Whether the numbers of a photo are proportional to light; only floats are.
-bool is_light(const RawImage& photo, const View& view) {
-  return std::holds_alternative<std::vector<float>>(photo.numbers) &&
-         image_codec().photo_colors(view.image_path.string()).light;
-}
-
-std::optional<Edges> edges_of(const View& view) {
-  try {
-    const RawImage photo = read_photo(view).raw;
-    const bool light = is_light(photo, view);
-    return std::visit([&](const auto& numbers) { return edges_of(photo, numbers, light); },
-                      photo.numbers);
-  } catch (const Error&) {
-    return std::nullopt;  // who needs the photo says what is wrong with it
-  }
-}
-
-bool is_fisheye(const Camera& photo) {
-  return photo.model == CameraModel::kFisheye ||
-         (photo.lens && photo.lens->form == PhotoLens::Form::kFisheye);
-}
 
 // Depths of the columns or rows that show something, of which `most` is all of the photo.
 std::vector<int> partly(const std::vector<int>& depths, int most) {
@@ -158,7 +54,7 @@ std::vector<int> partly(const std::vector<int>& depths, int most) {
 // Whether so much of a side is black that it may have a border.
 bool is_covered(const std::vector<int>& depths, int most) {
   const std::vector<int> shown = partly(depths, most);
-  const auto covers = [](int depth) { return depth >= kLeastDepth; };
+  const auto covers = [](int depth) { return depth >= kLeastBorder; };
   const auto covered = static_cast<double>(std::count_if(shown.begin(), shown.end(), covers));
   return !shown.empty() && covered >= kLeastCover * static_cast<double>(shown.size());
 }
@@ -174,19 +70,23 @@ bool is_straight(const std::vector<int>& depths, int most) {
 }
 
 // Whether most photos show something just where the border ends.
-bool is_agreed(const std::vector<int>& depths, std::span<const Edges> photos, Side side, int most) {
+bool is_agreed(const std::vector<int>& depths,
+               std::span<const BlackEdges> photos,
+               PhotoSide side,
+               int most) {
   const int slack = 2 + most / 200;
   std::size_t asked = 0, agreed = 0;
   for (std::size_t i = 0; i < depths.size(); ++i) {
-    if (depths[i] == most || depths[i] < kLeastDepth) continue;
+    if (depths[i] == most || depths[i] < kLeastBorder) continue;
     asked += photos.size();
-    for (const Edges& photo : photos) agreed += photo.depths[side][i] <= depths[i] + slack ? 1 : 0;
+    for (const BlackEdges& photo : photos)
+      agreed += photo.depths[side][i] <= depths[i] + slack ? 1 : 0;
   }
   return static_cast<double>(agreed) >= kLeastAgreement * static_cast<double>(asked);
 }
 
 // How deep all photos are black on one side, by column or row.
-std::vector<int> common_depths(std::span<const Edges> photos, Side side) {
+std::vector<int> common_depths(std::span<const BlackEdges> photos, PhotoSide side) {
   std::vector<int> out(photos.front().depths[side].size());
   std::vector<int> found(photos.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
@@ -199,84 +99,8 @@ std::vector<int> common_depths(std::span<const Edges> photos, Side side) {
   return out;
 }
 
-// Where something begins behind what is black from the photo's edges.
-std::vector<glm::dvec2> ends_of(const Edges& edges) {
-  std::vector<glm::dvec2> out;
-  const auto add = [&](Side side, const auto& place) {
-    for (std::size_t i = 0; i < edges.depths[side].size(); ++i) {
-      const int depth = edges.depths[side][i];
-      if (depth >= kLeastDepth && depth < edges.depth_of(side))
-        out.push_back(place(static_cast<double>(i) + 0.5, static_cast<double>(depth)));
-    }
-  };
-  add(kTop, [](double i, double depth) { return glm::dvec2(i, depth); });
-  add(kBottom, [&](double i, double depth) { return glm::dvec2(i, edges.height - depth); });
-  add(kLeft, [](double i, double depth) { return glm::dvec2(depth, i); });
-  add(kRight, [&](double i, double depth) { return glm::dvec2(edges.width - depth, i); });
-  return out;
-}
-
-struct Circle {
-  glm::dvec2 center{0.0};
-  double radius = 0;
-
-  double off(const glm::dvec2& point) const {
-    return std::abs(glm::distance(point, center) - radius);
-  }
-};
-
-// Least squares of |p|^2 = 2 c p + r^2 - |c|^2 (Kasa 1976), about the points' mean.
-Circle fitted_circle(std::span<const glm::dvec2> points) {
-  glm::dvec2 mean(0.0);
-  for (const glm::dvec2& p : points) mean += p / static_cast<double>(points.size());
-  glm::dmat2 squares(0.0);
-  glm::dvec2 moments(0.0);
-  double size = 0;
-  for (const glm::dvec2& p : points) {
-    const glm::dvec2 d = p - mean;
-    squares += glm::outerProduct(d, d);
-    moments += d * glm::dot(d, d) / 2.0;
-    size += glm::dot(d, d) / static_cast<double>(points.size());
-  }
-  if (!(std::abs(glm::determinant(squares)) > 0)) return {};
-  const glm::dvec2 center = glm::inverse(squares) * moments;
-  return {mean + center, std::sqrt(glm::dot(center, center) + size)};
-}
-
-// The circle that something is shown in, as that of a fisheye, which a photo may cut.
-std::optional<Circle> circle_of(const Edges& edges) {
-  std::vector<glm::dvec2> ends = ends_of(edges);
-  const double side = std::min(edges.width, edges.height);
-  if (static_cast<double>(ends.size()) < kLeastCover * side) return std::nullopt;
-  const std::size_t all = ends.size();
-  Circle circle = fitted_circle(ends);
-  // Once more without what is dark beside it.
-  std::erase_if(ends,
-                [&](const glm::dvec2& p) { return circle.off(p) > 2 * kMostOffCircle * side; });
-  if (ends.size() < 3) return std::nullopt;
-  circle = fitted_circle(ends);
-  const auto on = std::count_if(ends.begin(), ends.end(), [&](const glm::dvec2& p) {
-    return circle.off(p) <= kMostOffCircle * side;
-  });
-  const double most = std::hypot(edges.width, edges.height);  // larger ones are straight edges
-  const bool found = circle.radius >= kLeastRadius * side && circle.radius <= most &&
-                     static_cast<double>(on) >= kLeastOnCircle * static_cast<double>(all);
-  return found ? std::optional(circle) : std::nullopt;
-}
-
-// Whether the circle is that of the lens. Where all cameras see the outline of one ball in it, it
-// may be that of a body; fisheyes that look to one side alone are believed.
-bool is_of_lens(const Circle& circle, const Edges& edges, std::span<const Camera> cameras) {
-  const std::vector<glm::dvec2> ends = ends_of(edges);
-  std::vector<EdgePoint> points;
-  for (const std::size_t i : even_choice(ends.size(), kEdgePoints))
-    points.push_back({ends[i], glm::normalize(circle.center - ends[i])});
-  if (outline_misfit(cameras, points, RoundBody::kBall) >= kLeastMisfit) return true;
-  return is_fisheye(cameras.front()) && !look_around(cameras);
-}
-
 // Points of a side's straight edge, without its ends where these bend.
-std::vector<EdgePoint> straight_edge(const Edges& edges, Side side) {
+std::vector<EdgePoint> straight_edge(const BlackEdges& edges, PhotoSide side) {
   const std::vector<int>& depths = edges.depths[side];
   const int most = edges.depth_of(side);
   std::vector<int> shown = partly(depths, most);
@@ -286,10 +110,10 @@ std::vector<EdgePoint> straight_edge(const Edges& edges, Side side) {
   std::vector<std::size_t> places;
   for (std::size_t i = 0; i < depths.size(); ++i) {
     const bool straight = std::abs(depths[i] - *middle) <= 1 + kMostBend * most;
-    if (straight && depths[i] >= kLeastDepth && depths[i] < most) places.push_back(i);
+    if (straight && depths[i] >= kLeastBorder && depths[i] < most) places.push_back(i);
   }
   std::vector<EdgePoint> out;
-  for (const std::size_t i : even_choice(places.size(), kEdgePoints)) {
+  for (const std::size_t i : even_choice(places.size(), kOutlinePoints)) {
     const double along = static_cast<double>(places[i]) + 0.5;
     const double depth = depths[places[i]];
     const double inward = side == kTop || side == kLeft ? 1.0 : -1.0;
@@ -305,12 +129,12 @@ std::vector<EdgePoint> straight_edge(const Edges& edges, Side side) {
 
 // Whether edges on opposite sides are, for all cameras, the outline of one upright body, as of one
 // that turns before a black ground.
-bool is_body(const Edges& edges, std::span<const Camera> cameras) {
-  const auto outlines = [&](Side one, Side other) {
+bool is_body(const BlackEdges& edges, std::span<const Camera> cameras) {
+  const auto outlines = [&](PhotoSide one, PhotoSide other) {
     std::vector<EdgePoint> points = straight_edge(edges, one);
     const std::vector<EdgePoint> more = straight_edge(edges, other);
     points.insert(points.end(), more.begin(), more.end());
-    return outline_misfit(cameras, points, RoundBody::kCylinder) < kLeastMisfit;
+    return outline_misfit(cameras, points, RoundBody::kCylinder) < kMostOutlineMisfit;
   };
   return look_around(cameras) && (outlines(kLeft, kRight) || outlines(kTop, kBottom));
 }
@@ -320,14 +144,14 @@ bool is_full(const std::vector<int>& depths, int most) {
 }
 
 // What hides the border that photos agree about; empty where a side has none.
-std::array<std::vector<int>, kSides> hidden_depths(std::span<const Edges> photos,
-                                                   std::span<const Camera> cameras) {
-  Edges common{photos.front().width, photos.front().height, {}};
-  for (const Side side : {kTop, kBottom, kLeft, kRight})
+std::array<std::vector<int>, kPhotoSides> hidden_depths(std::span<const BlackEdges> photos,
+                                                        std::span<const Camera> cameras) {
+  BlackEdges common{photos.front().width, photos.front().height, {}};
+  for (const PhotoSide side : {kTop, kBottom, kLeft, kRight})
     common.depths[side] = common_depths(photos, side);
   const std::optional<Circle> round = circle_of(common);
   const bool circle = round && is_of_lens(*round, common, cameras);
-  for (const Side side : {kTop, kBottom, kLeft, kRight}) {
+  for (const PhotoSide side : {kTop, kBottom, kLeft, kRight}) {
     std::vector<int>& depths = common.depths[side];
     const int most = common.depth_of(side);
     const bool border = is_covered(depths, most) && (circle || is_straight(depths, most)) &&
@@ -335,12 +159,12 @@ std::array<std::vector<int>, kSides> hidden_depths(std::span<const Edges> photos
     if (!border) depths.clear();
   }
   if (!circle && is_body(common, cameras)) return {};
-  for (const Side side : {kTop, kBottom, kLeft, kRight}) {
+  for (const PhotoSide side : {kTop, kBottom, kLeft, kRight}) {
     const int most = common.depth_of(side);
     // Pictures are blurred where a border ends, and dark at the rim of a circle.
     const int margin = 1 + most / (circle ? 200 : 1000);
     for (int& depth : common.depths[side]) {
-      if (depth >= kLeastDepth) depth = std::min(depth + margin, most);
+      if (depth >= kLeastBorder) depth = std::min(depth + margin, most);
     }
   }
   return common.depths;
@@ -349,9 +173,9 @@ std::array<std::vector<int>, kSides> hidden_depths(std::span<const Edges> photos
 std::shared_ptr<const PhotoBorder> common_border(std::span<const View* const> photos) {
   std::vector<const View*> chosen;
   for (const std::size_t i : even_choice(photos.size(), kMostPhotos)) chosen.push_back(photos[i]);
-  std::vector<Edges> edges;
+  std::vector<BlackEdges> edges;
   std::vector<Camera> cameras;
-  const auto take = [&](std::optional<Edges> found, const View& view) {
+  const auto take = [&](std::optional<BlackEdges> found, const View& view) {
     if (!found || found->is_black()) return;
     edges.push_back(std::move(*found));
     cameras.push_back(view.source_camera);
@@ -359,15 +183,15 @@ std::shared_ptr<const PhotoBorder> common_border(std::span<const View* const> ph
   // Most captures have no border, which their first photo shows.
   std::size_t first = 0;
   for (; first < chosen.size() && edges.empty(); ++first)
-    take(edges_of(*chosen[first]), *chosen[first]);
-  const auto may_have = [&](Side side) {
+    take(black_edges(*chosen[first]), *chosen[first]);
+  const auto may_have = [&](PhotoSide side) {
     return is_covered(edges.front().depths[side], edges.front().depth_of(side));
   };
   if (edges.empty()) return nullptr;
   if (!may_have(kTop) && !may_have(kBottom) && !may_have(kLeft) && !may_have(kRight))
     return nullptr;
-  std::vector<std::optional<Edges>> others(chosen.size() - first);
-  in_parallel(others.size(), [&](std::size_t i) { others[i] = edges_of(*chosen[first + i]); });
+  std::vector<std::optional<BlackEdges>> others(chosen.size() - first);
+  in_parallel(others.size(), [&](std::size_t i) { others[i] = black_edges(*chosen[first + i]); });
   for (std::size_t i = 0; i < others.size(); ++i) take(std::move(others[i]), *chosen[first + i]);
   if (edges.size() < kLeastPhotos) return nullptr;
   auto [top, bottom, left, right] = hidden_depths(edges, cameras);
@@ -436,28 +260,13 @@ double hidden_share(const PhotoBorder& border) {
 
 bool has_border(const RawImage& photo, const View& view) {
   if (!view.border) return false;
-  const bool light = is_light(photo, view);
   // Without the margin at its end.
   const int margin = 1 + std::max(photo.width, photo.height) / 200;
   PhotoBorder inner = *view.border;
   for (std::vector<int>* depths : {&inner.top, &inner.bottom, &inner.left, &inner.right}) {
     for (int& depth : *depths) depth -= margin;
   }
-  std::size_t hidden = 0, shown = 0;
-  std::visit(
-      [&](const auto& numbers) {
-        using Number = typename std::decay_t<decltype(numbers)>::value_type;
-        const DarkPixels<Number> pixels(photo, numbers, light);
-        for (int y = 0; y < photo.height; ++y) {
-          for (int x = 0; x < photo.width; ++x) {
-            if (!inner.hides(x, y)) continue;
-            ++hidden;
-            shown += pixels.dark(x, y) ? 0 : 1;
-          }
-        }
-      },
-      photo.numbers);
-  return static_cast<double>(shown) <= kMostShown * static_cast<double>(hidden);
+  return shown_share(photo, view, inner) <= kMostShown;
 }
 
 }  // namespace raysplats::io
