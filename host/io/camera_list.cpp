@@ -17,6 +17,7 @@
 #include "io/data_origin.hpp"
 #include "io/json_file.hpp"
 #include "io/transforms.hpp"
+#include "io/transforms_camera.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "scene/camera_check.hpp"

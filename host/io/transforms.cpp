@@ -10,25 +10,16 @@
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <numbers>
-#include <span>
 #include <string>
 
-#include "io/camera_list.hpp"
 #include "io/camera_model_names.hpp"
-#include "io/find_image.hpp"
-#include "io/image_file.hpp"
 #include "io/json_file.hpp"
 #include "io/text_reader.hpp"
 #include "raysplats/error.hpp"
-#include "raysplats/io.hpp"
 #include "scene/camera_check.hpp"
-#include "scene/camera_model.hpp"
-#include "scene/photo_lens.hpp"
-#include "util/atomic_file.hpp"
 #include "util/path_text.hpp"
 
-namespace raysplats {
-namespace io {
+namespace raysplats::io {
 namespace {
 
 namespace fs = std::filesystem;
@@ -334,93 +325,6 @@ TransformsFile parse_transforms(const json& root, const fs::path& path) {
   return file;
 }
 
-namespace {
-
-/// Focal lengths across and down, as far as the frame has them, in pixels of its own size. Angles
-/// are those of planes alone.
-std::array<std::optional<double>, 2> focal_lengths(const TransformsFrame& frame,
-                                                   double width,
-                                                   double height) {
-  if (frame.fx || frame.fy || frame.model != CameraModel::kPinhole) return {frame.fx, frame.fy};
-  const auto focal = [](double side, const std::optional<double>& angle) {
-    return angle ? std::optional(0.5 * side / std::tan(0.5 * *angle)) : std::nullopt;
-  };
-  return {focal(width, frame.angle_x), focal(height, frame.angle_y)};
-}
-
-/// The lens of a frame that a Distortion does not say; `reach` is the image radius of the farthest
-/// corner, `crop` that of crop_radius or 0.
-std::optional<PhotoLens> photo_lens(const TransformsFrame& frame, double reach, double crop) {
-  const Distortion& d = frame.distortion;
-  const bool cropped = crop > 0 && crop < reach;
-  std::optional<PhotoLens> lens;
-  if (frame.model == CameraModel::kPhotoLens) {
-    lens = fisheye624(std::span<const double, 12>(frame.fisheye624));
-  } else if (frame.model == CameraModel::kFisheye && (d.p1 != 0 || d.p2 != 0 || cropped)) {
-    lens = PhotoLens{PhotoLens::Form::kFisheye, {d.k1, d.k2, d.k3, d.k4}, {}, d.p1, d.p2};
-  } else if (frame.model == CameraModel::kPinhole && d.k4 != 0) {
-    lens = PhotoLens{PhotoLens::Form::kPerspective, {d.k1, d.k2, d.k3, d.k4}, {}, d.p1, d.p2};
-  }
-  if (lens && cropped && frame.model != CameraModel::kPinhole) lens->radius = crop;
-  return lens;
-}
-
-}  // namespace
-
-Camera frame_camera(const TransformsFile& file, std::size_t index, int width, int height) {
-  const TransformsFrame& frame = file.frames[index];
-  const double nominal_width = frame.width.value_or(width);
-  const double nominal_height = frame.height.value_or(height);
-  Camera camera;
-  camera.width = width;
-  camera.height = height;
-  camera.rotation = frame.rotation;
-  camera.translation = frame.translation;
-  camera.model = frame.model;
-  if (frame.model == CameraModel::kEquirectangular) {
-    set_equirectangular(camera);
-    return camera;
-  }
-  const auto [fx, fy] = focal_lengths(frame, nominal_width, nominal_height);
-  if (!fx && !fy) {
-    throw DataError(fmt::format(
-        "{}: frame {} has {}, in it or in the file", file.path.string(), frame.number,
-        frame.model == CameraModel::kPinhole ? "neither fl_x nor camera_angle_x (nor x_fov)"
-                                             : "no fl_x, which its camera model needs"));
-  }
-  // Pixels are square where one of the two is all that is said.
-  camera.fx = fx ? *fx : *fy;
-  camera.fy = fy ? *fy : *fx;
-  const double scale_x = width / nominal_width;
-  const double scale_y = height / nominal_height;
-  camera.cx = frame.cx.value_or(0.5 * nominal_width) * scale_x;
-  camera.cy = frame.cy.value_or(0.5 * nominal_height) * scale_y;
-  camera.fx *= scale_x;
-  camera.fy *= scale_y;
-  if (frame.model == CameraModel::kOrthographic) return camera;
-  const double crop = frame.crop_radius.value_or(0.0) * scale_x / camera.fx;
-  if (const std::optional<PhotoLens> lens = photo_lens(frame, image_reach(camera), crop)) {
-    set_photo_lens(camera, *lens,
-                   fmt::format("{}: the camera of frame {}", file.path.string(), frame.number));
-    return camera;
-  }
-  camera.distortion = frame.distortion;
-  if (frame.model == CameraModel::kPinhole && frame.distortion.any())
-    camera.model = CameraModel::kOpenCv;
-  return camera;
-}
-
-json lens_keys(const Camera& camera) {
-  json out{{"camera_model", model_name(camera.model)}, {"cx", camera.cx}, {"cy", camera.cy}};
-  const Distortion& d = camera.distortion;
-  const bool fisheye = camera.model == CameraModel::kFisheye;
-  if (fisheye || camera.model == CameraModel::kOpenCv) {
-    out.update({{"k1", d.k1}, {"k2", d.k2}, {"k3", d.k3}});
-    out.update(fisheye ? json{{"k4", d.k4}} : json{{"p1", d.p1}, {"p2", d.p2}});
-  }
-  return out;
-}
-
 std::string inner_name(const fs::path& path) {
   fs::path name;
   for (const fs::path& part : path.lexically_normal().relative_path()) {
@@ -429,78 +333,4 @@ std::string inner_name(const fs::path& path) {
   return name.generic_string();
 }
 
-}  // namespace io
-
-std::vector<Camera> read_cameras(const std::filesystem::path& path) {
-  if (io::is_camera_list(path)) {
-    std::vector<Camera> views = io::read_listed_views(path);
-    if (views.empty()) throw DataError(fmt::format("{} lists no cameras", path.string()));
-    return views;
-  }
-  const io::TransformsFile file = io::read_transforms(path);
-  if (file.frames.empty()) throw DataError(fmt::format("{} has no frames", path.string()));
-  std::vector<Camera> cameras;
-  for (std::size_t i = 0; i < file.frames.size(); ++i) {
-    const io::TransformsFrame& frame = file.frames[i];
-    io::ImageSize size{frame.width.value_or(0), frame.height.value_or(0)};
-    if (!frame.width || !frame.height) {
-      // Blender's files state no size, but the photos beside them have one.
-      const auto image = frame.file_path.empty()
-                             ? std::nullopt
-                             : io::find_image(path.parent_path(), frame.file_path);
-      if (!image) {
-        throw DataError(
-            fmt::format("{}: frame {} has no image size: add \"w\" and \"h\" to it or to the file",
-                        path.string(), i));
-      }
-      size = io::image_size(*image);
-      if (frame.width) size.width = *frame.width;
-      if (frame.height) size.height = *frame.height;
-    }
-    cameras.push_back(rendered_camera(io::frame_camera(file, i, size.width, size.height)));
-    cameras.back().name =
-        frame.file_path.empty() ? fmt::format("frame_{:04d}", i) : io::inner_name(frame.file_path);
-    require_believable(cameras.back(), fmt::format("{}: the camera of frame {}", path.string(), i));
-  }
-  return cameras;
-}
-
-void write_cameras(const std::filesystem::path& path, const std::vector<Camera>& written) {
-  std::vector<Camera> cameras;
-  cameras.reserve(written.size());
-  for (const Camera& camera : written) cameras.push_back(rendered_camera(camera));
-  const auto intrinsics = [](Camera camera) {
-    if (camera.model == CameraModel::kEquirectangular) set_equirectangular(camera);
-    nlohmann::json out = io::lens_keys(camera);
-    out.update(
-        {{"w", camera.width}, {"h", camera.height}, {"fl_x", camera.fx}, {"fl_y", camera.fy}});
-    return out;
-  };
-  nlohmann::json root{{"frames", nlohmann::json::array()}};
-  // Readers of instant-ngp's dialect know intrinsics of the file only.
-  const bool shared = std::all_of(cameras.begin(), cameras.end(), [&](const Camera& camera) {
-    return intrinsics(camera) == intrinsics(cameras.front());
-  });
-  const bool one_model = std::all_of(cameras.begin(), cameras.end(), [&](const Camera& camera) {
-    return camera.model == cameras.front().model;
-  });
-  if (shared && !cameras.empty()) root.update(intrinsics(cameras.front()));
-  // nerfstudio reads the model of the file only.
-  if (!shared && one_model) root["camera_model"] = io::model_name(cameras.front().model);
-  for (const Camera& camera : cameras) {
-    nlohmann::json frame = shared ? nlohmann::json::object() : intrinsics(camera);
-    const glm::dmat3 to_world = glm::transpose(camera.rotation);
-    const glm::dvec3 center = camera.center();
-    nlohmann::json matrix = nlohmann::json::array();
-    for (int row = 0; row < 3; ++row) {
-      matrix.push_back({to_world[0][row], -to_world[1][row], -to_world[2][row], center[row]});
-    }
-    matrix.push_back({0.0, 0.0, 0.0, 1.0});
-    frame["file_path"] = camera.name;
-    frame["transform_matrix"] = std::move(matrix);
-    root["frames"].push_back(std::move(frame));
-  }
-  write_text_file(path, io::json_text(root, 1) + "\n");
-}
-
-}  // namespace raysplats
+}  // namespace raysplats::io

@@ -49,22 +49,11 @@ TransformsFile read_transforms(const std::filesystem::path& path);
 /// The same of what is in memory; `path` names it in errors, and files lie beside it.
 TransformsFile parse_transforms(const nlohmann::json& root, const std::filesystem::path& path);
 
-/// The camera of a frame whose photo has the given size; the file's own size scales its intrinsics,
-/// and of one focal length or angle alone it makes square pixels.
-/// kPhotoLens for FISHEYE624 and for what nerfstudio reads beyond OpenCV's lenses: k4 of planes, p1
-/// and p2 of fisheyes, fisheye_crop_radius.
-/// Throws DataError when the frame has no focal length or angle (equirectangular frames need none).
-Camera frame_camera(const TransformsFile& file, std::size_t frame, int width, int height);
-
 /// What an object of another kind of file says of a camera by the keys of a frame; no pose and no
 /// names. `where` says in errors, beside the path, whose it is. Throws as read_transforms() does.
 TransformsFrame stated_intrinsics(const nlohmann::json& object,
                                   const std::filesystem::path& path,
                                   const std::string& where);
-
-/// The keys that tell a camera's model, principal point and distortion; those of kPhotoLens, which
-/// no file of ours has, do not tell all.
-nlohmann::json lens_keys(const Camera& camera);
 
 /// A name without root, "." and ".." components, so that files named after it stay inside their
 /// folder.

@@ -16,6 +16,7 @@
 #include "io/find_image.hpp"
 #include "io/image_file.hpp"
 #include "io/photo_views.hpp"
+#include "io/transforms_camera.hpp"
 #include "raysplats/error.hpp"
 #include "util/file_kind.hpp"
 

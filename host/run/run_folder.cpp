@@ -18,7 +18,7 @@
 #include "io/file_hash.hpp"
 #include "io/json_file.hpp"
 #include "io/model_formats.hpp"
-#include "io/transforms.hpp"
+#include "io/transforms_camera.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "run/train_config.hpp"

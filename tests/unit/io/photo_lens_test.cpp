@@ -16,6 +16,7 @@
 #include "io/colmap_model.hpp"
 #include "io/depth_map.hpp"
 #include "io/transforms.hpp"
+#include "io/transforms_camera.hpp"
 #include "raysplats/dataset.hpp"
 #include "scene/camera_model.hpp"
 #include "unit/io/data_sets.hpp"
