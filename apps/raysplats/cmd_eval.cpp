@@ -91,6 +91,7 @@ void run(const Options& options, const GlobalOptions& global) {
         collect_rows(ranks, tracer.rows(), image);
       }
       if (!together || ranks.leads()) rays += image.pixels();
+      rays += tracer.reflected_rays();
       capped += tracer.capped_rays();
       return image;
     };

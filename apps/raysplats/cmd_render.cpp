@@ -185,6 +185,7 @@ RenderViews render_views(const RenderFlags& options,
 void add_up(Communicator& ranks, FrameReport& report) {
   report.frames = sum_over(ranks, report.frames);
   report.rays = sum_over(ranks, report.rays);
+  report.reflected_rays = sum_over(ranks, report.reflected_rays);
   report.capped_rays = sum_over(ranks, report.capped_rays);
   report.trace_seconds = most_of(ranks, report.trace_seconds);
 }
@@ -231,7 +232,7 @@ void render_model(const RenderFlags& options, const GlobalOptions& global) {
     progress.finish(report.frames, output.left());
     if (!ranks.leads()) return;
     output.finish();
-    warn_of_capped_rays(report.capped_rays, report.rays, trace);
+    warn_of_capped_rays(report.capped_rays, report.rays + report.reflected_rays, trace);
     print_summary(report, output.name(), context.build_seconds());
     if (options.device.profile) fmt::print("{}", context.profile_table());
   });

@@ -118,15 +118,10 @@ std::string scene_tail(TraceOptions own, TraceOptions trace, const glm::dvec3& u
   const std::vector<OptionRow> trained = trace_option_rows(own);
   std::string rows;
   for (std::size_t i = 0; i < given.size(); ++i) {
-    // Rays that leave a mirror have no camera that could be near.
+    // Scenes have no near limit.
     if (given[i].name == "near") continue;
     if (given[i].text() != trained[i].text())
       rows += fmt::format("{} = {}\n", given[i].name, given[i].text());
-  }
-  if (trace.near_depth > 0) {
-    text += fmt::format(
-        "\n# The page left out Gaussians nearer than {} to the camera, which scene files cannot.\n",
-        trace.near_depth);
   }
   return rows.empty() ? text : text + "\n[trace]\n" + rows;
 }

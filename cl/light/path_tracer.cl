@@ -58,7 +58,11 @@ __kernel void results_of_picture(const uint count,
                                  __global const RsSurface* restrict surfaces,
                                  __global RsRayResult* restrict results) {
   const uint i = get_global_id(0);
-  if (i >= count || surfaces[i].material >= 0) return;
+  if (i >= count) return;
+  if (surfaces[i].material >= 0) {
+    results[i].capped = 0;  // the packets that made the picture have counted its ray
+    return;
+  }
   __global const float* at = picture + first_pixel + i;
   const size_t plane = pixels;
   const float3 color = (float3)(at[0], at[plane], at[2 * plane]);
@@ -259,10 +263,10 @@ __kernel void shadow_rays(const uint count,
   skip[i] = skipped;
 }
 
-// Adds a light sample to gaussian_light (sum of weight V, sum of weights, number of rays) or to
-// surface_light (diffuse rgb, number of rays, specular rgb). passes: light that passes the
-// triangles; blocked: results of the Gaussians on the way; either counts only where its flag is
-// set.
+// Adds a light sample to gaussian_light (sum of weight V, sum of weights, number of rays, number
+// that max_hits stopped) or to surface_light (diffuse rgb, number of rays, specular rgb, number
+// that max_hits stopped). passes: light that passes the triangles; blocked: results of the
+// Gaussians on the way; either counts only where its flag is set.
 __kernel void add_light(const uint count,
                         const RsWave wave,
                         const int number,
@@ -282,12 +286,13 @@ __kernel void add_light(const uint count,
   if (use_triangles) visible *= passes[i];
   if (use_gaussians) visible *= 1.0f - blocked[i].alpha;
   visible = 1.0f - wave.strength * (1.0f - visible);
+  const float capped = use_gaussians && blocked[i].capped != 0 ? 1.0f : 0.0f;
   float3 direction;
   float distance;
   if (gaussians) {
     const float3 p = gaussian_place(load_result(results, i), load_ray(rays, i));
     const float weight = share * max3(light_at(lights + number, p, &direction, &distance));
-    gaussian_light[i] += (float4)(weight * visible, weight, 1.0f, 0.0f);
+    gaussian_light[i] += (float4)(weight * visible, weight, 1.0f, capped);
     return;
   }
   const RsSurface s = surfaces[i];
@@ -299,11 +304,12 @@ __kernel void add_light(const uint count,
       pow(fmax(dot(n, half_vector), 0.0f), lobe_exponent(materials[s.material].roughness));
   const float3 diffuse = e * fmax(dot(n, direction), 0.0f);
   const float3 specular = e * (materials[s.material].specular * lobe);
-  surface_light[i] += (float8)(diffuse, 1.0f, specular, 0.0f);
+  surface_light[i] += (float8)(diffuse, 1.0f, specular, capped);
 }
 
 // gained[i]: colour that path i has gained, and the share of its light that left the scene.
-// tallies[i]: shadow rays, whether max_hits stopped the ray, rays that max_bounces ended.
+// tallies[i]: shadow rays, rays that max_hits stopped (the path's own with them), rays that
+// max_bounces ended.
 // counts[i]: rays that go on, in the slots 2 i and 2 i + 1.
 __kernel void advance(const uint count,
                       const RsWave wave,
@@ -334,7 +340,8 @@ __kernel void advance(const uint count,
   const Ray ray = load_ray(rays, i);
   const RayResult result = load_result(results, i);
   const float4 light = gaussian_light[i];
-  uint4 tally = (uint4)((uint)light.z + (uint)surface_light[i].s3, result.capped, 0, 0);
+  uint4 tally = (uint4)((uint)light.z + (uint)surface_light[i].s3,
+                        (uint)light.w + (uint)surface_light[i].s7 + result.capped, 0, 0);
   float3 throughput = vload3(0, path->throughput);
   float3 to_gaussians = throughput;
   const uint body = innermost(media_of(path));

@@ -174,6 +174,16 @@ void load_meshes(const SceneFile& file, LoadedScene& out) {
   }
 }
 
+/// Scenes leave out no Gaussians that are near to the camera, though a model may have been trained
+/// so.
+void tell_of_near_limit(const TraceOptions& trace) {
+  if (trace.near_depth <= 0.0f) return;
+  spdlog::warn(
+      "the model leaves out Gaussians nearer than {:g} to the camera, but scenes show them: rays "
+      "that leave a mirror have no camera that could be near",
+      trace.near_depth);
+}
+
 /// Where there are no Gaussians, the box around the meshes.
 SceneExtent extent_of(const Scene& scene) {
   if (scene.gaussians.size() > 0) return scene_extent(scene.gaussians);
@@ -250,6 +260,7 @@ LoadedScene load_scene(const SceneFile& file) {
   out.scene.lights = file.lights;
   out.scene.render = file.render;
   out.scene.trace = file.trace.over(file.trained);
+  tell_of_near_limit(out.scene.trace);
   out.scene.environment = load_environment(file, out.scene.trace);
   out.extent = extent_of(out.scene);
   out.cameras = frame_cameras(file, out.extent);

@@ -102,6 +102,12 @@ void MirrorPaths::trace(const DeviceGaussians& gaussians,
   }
 }
 
+std::uint64_t MirrorPaths::reflected_rays() const {
+  std::uint64_t sum = 0;
+  for (std::size_t number = 1; number < used_; ++number) sum += levels_[number].count;
+  return sum;
+}
+
 void MirrorPaths::backward(const DeviceGaussians& gaussians,
                            RayBackward& sums,
                            Buffer<RayBackward::PaddedRayGradient>* ray_gradients) {

@@ -35,6 +35,8 @@ class MirrorPaths {
              ColorDirection direction,
              const std::array<float, 3>& background,
              const Buffer<std::uint32_t>& capped);
+  /// Rays of the last trace() that mirrors have reflected.
+  std::uint64_t reflected_rays() const;
   /// What the rays saw: colour with the background, and coverage.
   const Buffer<std::array<float, 4>>& seen() const { return levels_[0].seen; }
   /// What they met before the first mirror, over black.

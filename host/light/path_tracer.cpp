@@ -37,9 +37,11 @@ constexpr std::size_t kGroup = 64;
 constexpr std::size_t kTallyChunk = 1024;
 constexpr std::size_t kWatchedBatch = std::size_t{1} << 16;  // rays between two looks at the watch
 
-TraceOptions without_background(TraceOptions options) {
+// Without what belongs to a camera's view.
+TraceOptions ray_options(TraceOptions options) {
   options.background = {0, 0, 0};
-  options.sky.clear();  // the scene's environment has it
+  options.sky.clear();     // the scene's environment has it
+  options.near_depth = 0;  // rays that leave a mirror have no camera that could be near
   return options;
 }
 
@@ -85,7 +87,7 @@ struct PathTracer::Impl {
       : context(context_in),
         settings((check_render_settings(scene.render), scene.render)),
         memory(memory_of(scene, context_in.device())),
-        options(without_background(scene.trace)),
+        options(ray_options(scene.trace)),
         gaussians(DeviceGaussians::upload(context_in, scene.gaussians, ScaleActivation::kExp)),
         tracer(context_in, options),
         surfaces(context_in, scene),

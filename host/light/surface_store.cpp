@@ -10,6 +10,7 @@
 
 #include "light/environment.hpp"
 #include "raysplats/error.hpp"
+#include "scene/mesh.hpp"
 #include "shared/light_layout.h"
 
 namespace raysplats {
@@ -139,22 +140,15 @@ SurfaceStore::SurfaceStore(Context& context, const Scene& scene)
 }
 
 void SurfaceStore::set_meshes(const std::vector<Mesh>& meshes) {
+  for (std::size_t m = 0; m < meshes.size(); ++m)
+    validate(meshes[m], kinds_.size(), fmt::format("{}", m));
   triangles_.build(meshes);
   std::vector<float> vertices;
   std::vector<std::uint32_t> of;
   std::vector<float> shadows;
   vertices.reserve(RS_TRIANGLE_FLOATS * triangles_.size());
   lit_ = false;
-  for (std::size_t m = 0; m < meshes.size(); ++m) {
-    const Mesh& mesh = meshes[m];
-    const std::size_t n = mesh.vertex_count();
-    if ((!mesh.normals.empty() && mesh.normals.size() != 3 * n) ||
-        (!mesh.uvs.empty() && mesh.uvs.size() != 2 * n) ||
-        mesh.materials.size() != mesh.triangle_count()) {
-      throw DataError(fmt::format(
-          "Mesh {} has normals, uvs or materials of another number than its vertices and triangles",
-          m));
-    }
+  for (const Mesh& mesh : meshes) {
     for (std::size_t i = 0; i < 3 * mesh.triangle_count(); ++i) {
       const std::size_t v = mesh.triangles[i];
       for (std::size_t k = 0; k < 3; ++k) vertices.push_back(mesh.positions[3 * v + k]);
@@ -166,9 +160,6 @@ void SurfaceStore::set_meshes(const std::vector<Mesh>& meshes) {
       }
     }
     for (const std::uint32_t material : mesh.materials) {
-      if (material >= kinds_.size()) {
-        throw DataError(fmt::format("Mesh {} names material {} of {}", m, material, kinds_.size()));
-      }
       const Material& kind = kinds_[material];
       lit_ = lit_ || kind.kind == Material::Kind::kDiffuse ||
              kind.kind == Material::Kind::kTransparent;

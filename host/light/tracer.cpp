@@ -412,6 +412,12 @@ std::uint64_t Tracer::capped_rays() const {
   return self.width == 0 ? 0 : self.views.capped_rays();
 }
 
+std::uint64_t Tracer::reflected_rays() const {
+  const Impl& self = *impl_;
+  const auto lock = self.context.lock();
+  return self.last_was_picture && self.width > 0 ? self.views.reflected_rays() : 0;
+}
+
 const TraceOptions& Tracer::options() const { return impl_->options; }
 
 const Context& Tracer::context() const { return impl_->context; }

@@ -154,7 +154,8 @@ struct ViewTracer::Impl {
   std::size_t part = 0, parts = 1;  // of pictures
   // The last view.
   bool by_rays = false;
-  bool own_image = false;  // `image` is what it shows, else that of `packets`
+  std::uint64_t reflected_rays = 0;  // where by_rays
+  bool own_image = false;            // `image` is what it shows, else that of `packets`
   bool kept = false;
   std::uint64_t revision = 0;  // of its Gaussians
   Camera camera;
@@ -264,6 +265,7 @@ void ViewTracer::Impl::trace_batch(const DeviceGaussians& gaussians,
 void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians, bool keep) {
   MirrorPaths& paths = rays->paths;
   rays->capped.clear();
+  reflected_rays = 0;
   const std::size_t pixels = pixel_count(camera);
   image.ensure(context, 4 * pixels, "image");
   if (options.depth) depth.ensure(context, 3 * pixels, "depth");
@@ -274,6 +276,7 @@ void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians, bool keep)
   for (std::size_t first = begin; first < end; first += batch()) {
     const std::size_t count = std::min(batch(), end - first);
     trace_batch(gaussians, first, count, rays->capped);
+    reflected_rays += paths.reflected_rays();
     kernel("store_picture")
         .launch(Range::linear(count, kGroup), u32(count), u32(first), u32(pixels), paths.seen(),
                 image);
@@ -421,6 +424,10 @@ Sky* ViewTracer::sky() { return impl_->sky ? &*impl_->sky : nullptr; }
 std::uint64_t ViewTracer::capped_rays() const {
   const Impl& self = *impl_;
   return self.by_rays ? count_of(self.rays->capped) : self.packets.statistics().capped_rays;
+}
+
+std::uint64_t ViewTracer::reflected_rays() const {
+  return impl_->by_rays ? impl_->reflected_rays : 0;
 }
 
 CameraTracer::Statistics ViewTracer::statistics() const {

@@ -97,8 +97,11 @@ class ViewTracer {
   /// The sky of the next view, whose coefficients may be changed, and the gradient that backward()
   /// has found for it; null without one.
   Sky* sky();
-  /// Rays of the last view that stopped because of max_hits; blocks.
+  /// Rays of the last view that stopped because of max_hits, those that mirrors have reflected with
+  /// them; blocks.
   std::uint64_t capped_rays() const;
+  /// Rays of the last view that mirrors have reflected.
+  std::uint64_t reflected_rays() const;
   /// What the last view took, on every device the same; zeros where it was traced ray by ray.
   /// Blocks.
   CameraTracer::Statistics statistics() const;

@@ -72,6 +72,7 @@ struct Exposed {
   Image rgba;   ///< empty when it was stopped
   Image depth;  ///< weighted_depth(), where options ask
   Image hits;   ///< where options ask
+  std::uint64_t reflected_rays = 0;
   std::uint64_t capped_rays = 0;
 };
 
@@ -98,6 +99,7 @@ Exposed exposed(Tracer& tracer,
       if (options.hits) add(out.hits, hits_of(depth));
     }
     add(out.rgba, std::move(picture));
+    out.reflected_rays += tracer.reflected_rays();
     out.capped_rays += tracer.capped_rays();
   }
   for (Image* image : {&out.rgba, &out.depth, &out.hits}) divide(*image, moments);
@@ -127,6 +129,8 @@ std::vector<std::string> frame_names(std::span<const Camera> cameras) {
     ++stems[names[i]];
   }
   std::set<std::string> used;
+  // The first number behind a name that was not tried yet: many frames may have one name.
+  std::map<std::string, int> untried;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     std::string name = names[i];
     if (stems[name] > 1) {
@@ -134,7 +138,8 @@ std::vector<std::string> frame_names(std::span<const Camera> cameras) {
       if (name.empty()) name = names[i];
     }
     std::string unique = name;
-    for (int n = 2; !used.insert(unique).second; ++n) unique = fmt::format("{}_{}", name, n);
+    int& n = untried.try_emplace(name, 2).first->second;
+    for (; !used.insert(unique).second; ++n) unique = fmt::format("{}_{}", name, n);
     names[i] = unique;
   }
   return names;
@@ -214,6 +219,7 @@ FrameReport write_frames(Tracer& tracer,
     if (options.depth) layers.depth = average_depth(samples.depth, options.supersample);
     if (options.hits) layers.hits = box_average(samples.hits, options.supersample);
     report.trace_seconds += seconds_since(start) - (tracer.context().build_seconds() - built);
+    report.reflected_rays += samples.reflected_rays;
     report.capped_rays += samples.capped_rays;
     // What follows is left to the one that leads.
     if (!ranks.leads()) {

@@ -53,9 +53,10 @@ struct FrameOptions {
 
 struct FrameReport {
   std::size_t frames = 0;
-  std::uint64_t rays = 0;
-  std::uint64_t capped_rays = 0;  ///< rays that stopped because of max_hits
-  double trace_seconds = 0;       ///< tracing and download, without files and compiling kernels
+  std::uint64_t rays = 0;            ///< through pixels
+  std::uint64_t reflected_rays = 0;  ///< by mirrors
+  std::uint64_t capped_rays = 0;     ///< rays of both that stopped because of max_hits
+  double trace_seconds = 0;          ///< tracing and download, without files and compiling kernels
 };
 
 /// One file name without extension and folder per camera: the stem of the image name; where stems

@@ -21,7 +21,8 @@ namespace raysplats {
 /// (docs/light.md): paths advance one surface at a time, all of a picture's together, as waves of
 /// rays without the ones that have ended (Laine, Karras and Aila 2013). With one sample per pixel
 /// the rays of a camera with a centre are traced in packets as Tracer does, unless lights on
-/// Gaussians ask for more; rays that end on a surface are traced once more. Threads: as Context.
+/// Gaussians ask for more; rays that end on a surface are traced once more. Of Scene::trace
+/// near_depth, background and sky mean nothing here. Threads: as Context.
 class PathTracer {
  public:
   /// Numbers of rays of the last render().
@@ -29,8 +30,8 @@ class PathTracer {
     std::uint64_t camera_rays = 0;     ///< through the pixels of the picture
     std::uint64_t continued_rays = 0;  ///< behind mirrors, glass, transparent and diffuse surfaces
     std::uint64_t shadow_rays = 0;     ///< from surfaces and Gaussians
-    std::uint64_t capped_rays = 0;     ///< stopped because of TraceOptions::max_hits; where packets
-                                       ///< trace the camera's rays, on their whole way
+    std::uint64_t capped_rays = 0;     ///< of all these, stopped because of TraceOptions::max_hits;
+                                       ///< where packets trace the camera's, on their whole way
     std::uint64_t ended_by_bounces = 0;  ///< paths that max_bounces ended
   };
 

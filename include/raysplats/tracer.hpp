@@ -93,8 +93,11 @@ class Tracer {
   /// Gradients of the last rays, one gradient for each of them. Throws as the other backward().
   RaysGradients backward(const Model& model, std::span<const RayResultGradient> gradients);
 
-  /// Rays of the last render() or trace() that stopped because of options.max_hits.
+  /// Rays of the last render() or trace() that stopped because of options.max_hits, those that
+  /// mirrors have reflected with them.
   std::uint64_t capped_rays() const;
+  /// Rays of the last render() that mirrors have reflected; 0 after trace().
+  std::uint64_t reflected_rays() const;
   /// The options that it was made with; background and sky as set since.
   const TraceOptions& options() const;
   /// The context that it was made with.

@@ -331,6 +331,19 @@ TEST_CASE("scene loader: open glass that bends or absorbs light is told of, once
   CHECK_FALSE(told("wedge.obj", "kind = 'glass'\n"));
 }
 
+TEST_CASE("scene loader: that scenes have no near limit is told where the model has one") {
+  const Folder folder;
+  const auto told = [&](const std::string& trace) {
+    SceneFile file = folder.read("[[model]]\nfile = 'a.ply'\n" + kCamera + trace);
+    file.trained.near_depth = 0.75f;
+    const LogCapture log;
+    load_scene(file);
+    return log.contains("0.75") ? log.lines() : 0;
+  };
+  CHECK(told("") == 1);
+  CHECK(told("[trace]\nnear = 0\n") == 0);
+}
+
 TEST_CASE("scene loader: an orbit around nothing has a camera") {
   const Folder folder;
   Gaussians nothing;

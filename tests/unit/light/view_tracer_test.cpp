@@ -142,6 +142,29 @@ TEST_CASE("parts of a picture have its pixels, and nobody traces another's") {
   }
 }
 
+TEST_CASE("reflected rays are counted, of which max_hits may stop each as well") {
+  Context context = make_test_context();
+  const DeviceGaussians gaussians =
+      DeviceGaussians::upload(context, reference::random_scene(300, 17, 0), ScaleActivation::kExp);
+  TraceOptions options;
+  options.max_hits = 1;
+  const Camera camera = view_of(CameraModel::kPinhole, 260, 256, 240);
+  const std::uint64_t pixels = 260 * 256;
+  // Two mirrors that face each other: one behind the cloud, one behind the camera.
+  const Mirrors mirrors = mirrors_of({{{-50, -50, 1.5}, {100, 0, 0}, {0, 100, 0}, {1, 1, 1}},
+                                      {{-50, -50, -9}, {100, 0, 0}, {0, 100, 0}, {1, 1, 1}}},
+                                     2);
+  ViewTracer tracer(context, options, mirrors);
+  CHECK(tracer.reflected_rays() == 0);
+  tracer.set_watch([](double) { return true; });  // in batches
+  tracer.forward(gaussians, camera);
+  CHECK(tracer.reflected_rays() == 2 * pixels);
+  CHECK(tracer.capped_rays() <= pixels + tracer.reflected_rays());
+  ViewTracer bare(context, options);
+  bare.forward(gaussians, camera);
+  CHECK(bare.reflected_rays() == 0);
+}
+
 TEST_CASE("what a tracer of rays refuses, and a tree that is refitted") {
   Context context = make_test_context();
   TraceOptions near;

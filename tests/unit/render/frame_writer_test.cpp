@@ -62,6 +62,18 @@ TEST_CASE("frames are named after the images") {
   CHECK(names_of({"", ""}) == std::vector<std::string>{"frame_0000", "frame_0001"});
 }
 
+TEST_CASE("frames of one name are numbered, around the names that others have") {
+  CHECK(names_of({"a.png", "a_2.png", "a.png", "a.png", "a_2.png", "a_5.png", "a.png", "a.png"}) ==
+        std::vector<std::string>{"a", "a_2", "a_3", "a_4", "a_2_2", "a_5", "a_6", "a_7"});
+  // So many that trying all numbers again for each of them would take minutes.
+  constexpr std::size_t kMany = 50000;
+  const std::vector<std::string> names = names_of(std::vector<std::string>(kMany, "left/a.png"));
+  REQUIRE(names.size() == kMany);
+  CHECK(names.front() == "left_a");
+  CHECK(names[1] == "left_a_2");
+  CHECK(names.back() == "left_a_50000");
+}
+
 TEST_CASE("depth, hits and capped rays of a blurred frame are those of all its moments") {
   const TemporaryDirectory folder;
   Context context(test_device());
