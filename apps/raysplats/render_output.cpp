@@ -3,6 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "io/side_limits.hpp"
 #include "raysplats/error.hpp"
 #include "render/output_check.hpp"
 #include "util/atomic_file.hpp"
@@ -38,11 +43,18 @@ RenderOutput::RenderOutput(const RenderFlags& flags,
     if (!flags.data.data.empty()) check_not_data(flags.output, flags.data.data);
     if (!flags.cameras.empty()) check_not_data(flags.output, flags.cameras);
     if (!flags.overwrite) check_outside_data(flags.output);
-    check_leftovers(flags.output, frame_names(cameras), options_.format, flags.overwrite);
+    const std::vector<std::string> names = frame_names(cameras);
+    const std::string extension = file_extension(options_.format);
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      io::require_writable_size(std::filesystem::path(flags.output) / (names[i] + extension),
+                                cameras[i].width, cameras[i].height);
+    }
+    check_leftovers(flags.output, names, options_.format, flags.overwrite);
   }
   if (flags.video.empty()) return;
   check_output_file(flags.video, flags.overwrite);
   for (const Camera& camera : cameras) {
+    io::require_writable_size(flags.video, camera.width, camera.height);
     if (camera.width == cameras.front().width && camera.height == cameras.front().height) continue;
     throw UsageError(fmt::format(
         "--video needs frames of one size, and the cameras have {} x {} and {} x {} pixels",

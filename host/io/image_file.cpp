@@ -15,6 +15,7 @@
 #include "io/image_header.hpp"
 #include "io/image_integrity.hpp"
 #include "io/image_limits.hpp"
+#include "io/side_limits.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "util/atomic_file.hpp"
@@ -163,6 +164,7 @@ void write_image(const std::filesystem::path& path,
                     "named) do not fit the format",
                     path.string(), image.width, image.height, image.channels, extra));
   }
+  io::require_writable_size(path, image.width, image.height);
   io::ImageEncoding encoding{
       exr ? "openexr" : (jpeg ? "jpeg" : "png"), {}, color_space_name(space)};
   if (exr) encoding.channel_names = exr_channel_names(image, extra_channels);

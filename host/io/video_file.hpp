@@ -15,8 +15,8 @@ class VideoFile {
  public:
   virtual ~VideoFile() = default;
   /// RGB of values in [0, 1] as trained (3 channels or more); all frames have one size. Throws
-  /// UsageError for another one, DataError when the file cannot be written, Error with what the
-  /// encoder said when that fails.
+  /// UsageError for another one and for more pixels a side than the format has, DataError when the
+  /// file cannot be written, Error with what the encoder said when that fails.
   virtual void add(const Image& frame) = 0;
   virtual void finish() = 0;
 };

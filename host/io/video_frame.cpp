@@ -5,12 +5,14 @@
 
 #include <algorithm>
 
+#include "io/side_limits.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats {
 
 void FrameSize::require(const Image& frame, const std::filesystem::path& video) {
   if (width == 0) {
+    io::require_writable_size(video, frame.width, frame.height);
     width = frame.width;
     height = frame.height;
   }

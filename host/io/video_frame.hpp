@@ -13,7 +13,7 @@ namespace raysplats {
 struct FrameSize {
   int width = 0;
   int height = 0;
-  /// Throws UsageError for a frame of another size.
+  /// Throws UsageError for a frame of another size or beyond what the video's format holds.
   void require(const Image& frame, const std::filesystem::path& video);
 };
 

@@ -83,7 +83,8 @@ enum class ColorSpace { kUnknown, kLinear, kDisplay };
 
 /// Writes .png, .jpg or .exr by the extension, atomically. 8-bit formats clamp to [0, 1] and round.
 /// An EXR with channels beyond RGBA takes their names from `extra_channels` (for example "Z"),
-/// and says in its attribute "oiio:ColorSpace" what `space` says.
+/// and says in its attribute "oiio:ColorSpace" what `space` says. Throws UsageError for more pixels
+/// a side than the format has (JPEG 65500, PNG 1000000), DataError when the file cannot be written.
 void write_image(const std::filesystem::path& path,
                  const Image& image,
                  const std::vector<std::string>& extra_channels = {},

@@ -224,6 +224,27 @@ TEST_CASE("a GIF lasts as long as its frames, and is whole or not there") {
   CHECK(!fs::exists(folder / "full.gif"));
 }
 
+TEST_CASE("sizes that the format cannot hold are refused before a device is asked for") {
+  const TemporaryFolder folder;
+  write_file(folder / "balls.ply", ply_file(3));
+  const auto refused = [&](const Words& size, const Words& output, const std::string& part) {
+    const Words command{"render", folder / "balls.ply", "--orbit", "2", "-q", "--device", "none"};
+    const Outcome outcome = raysplats_program(command + size + output);
+    INFO(outcome.err);
+    CHECK(outcome.code == 2);
+    CHECK(one_sentence(outcome));
+    CHECK(outcome.err.find(part) != std::string::npos);
+    CHECK(entries(folder.path()) == 1);
+  };
+  const Words wide{"--width", "70000", "--height", "2"};
+  const Words high{"--width", "2", "--height", "1048576"};
+  const std::string video = folder / "a";
+  refused(wide, {"--video", video + ".gif"}, "GIF has at most 65535 a side");
+  refused(high, {"--video", video + ".apng"}, "APNG has at most 1000000 a side");
+  refused(wide, {"-o", video, "--format", "jpg"}, "JPEG has at most 65500 a side");
+  refused(high, {"-o", video}, "PNG has at most 1000000 a side");
+}
+
 TEST_CASE("names of videos are no options and no addresses to ffmpeg") {
   const TemporaryFolder folder;
   Surroundings around =

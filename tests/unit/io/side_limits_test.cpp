@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/side_limits.hpp"
+
+#include <doctest/doctest.h>
+
+#include <string>
+
+#include "io/video_file.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/io.hpp"
+#include "unit/io/scratch.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+template <class Action>
+std::string usage_error(Action action) {
+  try {
+    action();
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST_CASE("every format has its largest side, either way round") {
+  struct Limit {
+    const char* name;
+    const char* format;
+    int most;
+  };
+  for (const Limit& limit : {Limit{"a.jpg", "JPEG", 65500}, Limit{"b/a.JPEG", "JPEG", 65500},
+                             Limit{"a.png", "PNG", 1000000}, Limit{"a.apng", "APNG", 1000000},
+                             Limit{"a.gif", "GIF", 65535}}) {
+    CAPTURE(limit.name);
+    CHECK_NOTHROW(io::require_writable_size(limit.name, limit.most, limit.most));
+    for (const bool wide : {false, true}) {
+      const std::string message = usage_error([&] {
+        io::require_writable_size(limit.name, wide ? limit.most + 1 : 1, wide ? 1 : limit.most + 1);
+      });
+      CHECK(message.starts_with(limit.name));
+      CHECK(contains(message, std::string(limit.format) + " has at most"));
+      CHECK(contains(message, std::to_string(limit.most) + " a side: make it smaller"));
+    }
+  }
+  CHECK_NOTHROW(io::require_writable_size("a.exr", 1 << 20, 1 << 20));
+}
+
+TEST_CASE("pictures that are larger than their format are refused, and nothing is written") {
+  const Scratch scratch;
+  for (const char* name : {"a.jpg", "a.png"}) {
+    const int most = name == std::string("a.jpg") ? 65500 : 1000000;
+    CHECK(usage_error([&] { write_image(scratch / name, Image(most + 1, 1, 3)); }) != "");
+    CHECK(usage_error([&] { write_image(scratch / name, Image(1, most + 1, 1)); }) != "");
+    CHECK(fs::is_empty(scratch.path()));
+  }
+  write_image(scratch / "a.jpg", Image(65500, 1, 3, 0.5f));
+  write_image(scratch / "b.exr", Image(65501, 1, 3, 0.5f));
+  CHECK(fs::file_size(scratch / "a.jpg") > 0);
+  CHECK(fs::file_size(scratch / "b.exr") > 0);
+}
+
+TEST_CASE("frames that are larger than a video's format are refused") {
+  const Scratch scratch;
+  for (const char* name : {"a.gif", "a.apng"}) {
+    CAPTURE(name);
+    const int most = name == std::string("a.gif") ? 65535 : 1000000;
+    const auto video = open_video(scratch / name, {10.0, 1});
+    CHECK(contains(usage_error([&] { video->add(Image(most + 1, 1, 3)); }), name));
+  }
+  CHECK(fs::is_empty(scratch.path()));
+  const auto gif = open_video(scratch / "b.gif", {10.0, 1});
+  gif->add(Image(65535, 1, 3, 0.5f));
+  gif->finish();
+  const std::string bytes = read_bytes(scratch / "b.gif");
+  CHECK(bytes.substr(6, 4) == std::string("\xff\xff\x01\x00", 4));
+}
