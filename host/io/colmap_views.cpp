@@ -73,12 +73,13 @@ std::vector<View> colmap_views(const ColmapModel& model,
   for (const ColmapImage& image : model.images) masks.add(image.name);
   std::vector<View> views;
   std::size_t stretched = 0, respelt = 0;
+  RespeltFinder respelt_photos;
   std::string first_respelt;
   std::vector<std::string> missing;
   for (const ColmapImage& image : model.images) {
     View view;
     auto photo = find_photo(folder.path, image.name);
-    if (!photo && (photo = find_respelt(folder.path, image.name)) && respelt++ == 0)
+    if (!photo && (photo = respelt_photos.find(folder.path, image.name)) && respelt++ == 0)
       first_respelt = image.name;
     if (!photo) {
       missing.push_back(image.name);

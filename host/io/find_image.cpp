@@ -19,20 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The single entry of a folder that is wanted; nothing when there is none or several.
-std::optional<fs::path> only_entry(const fs::path& folder,
-                                   const std::function<bool(const fs::path&)>& wanted) {
-  std::optional<fs::path> found;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    if (!wanted(entry->path())) continue;
-    if (found) return std::nullopt;
-    found = entry->path();
-  }
-  return found;
-}
-
 /// The letters that those of U+00C0 to U+017F are with a mark on them; a point for the others.
 constexpr std::string_view kBaseLetters =
     "AAAAAA.CEEEEIIII.NOOOOO..UUUUY..aaaaaa.ceeeeiiii.nooooo..uuuuy.y"
@@ -92,6 +78,26 @@ bool same_but_spelling(std::string_view a, std::string_view b) {
   return bare_a.has_mark != bare_b.has_mark && same_but_case(bare_a.text, bare_b.text);
 }
 
+/// What all names have in common that same_but_spelling() takes for one.
+std::string folded(std::string_view name) { return ascii_lower(without_marks(name).text); }
+
+/// The single one of the names of a folder's entries, folded as `name` is, that is wanted; nothing
+/// when there is none or several.
+std::optional<fs::path> only_entry(const fs::path& folder,
+                                   const std::multimap<std::string, std::string>& names,
+                                   std::string_view name,
+                                   const std::function<bool(const fs::path&)>& wanted) {
+  std::optional<fs::path> found;
+  const auto [first, last] = names.equal_range(folded(name));
+  for (auto entry = first; entry != last; ++entry) {
+    fs::path path = folder / entry->second;
+    if (!wanted(path)) continue;
+    if (found) return std::nullopt;
+    found = std::move(path);
+  }
+  return found;
+}
+
 }  // namespace
 
 std::optional<fs::path> find_image(const fs::path& folder, const fs::path& file_path) {
@@ -107,23 +113,6 @@ std::optional<fs::path> find_image(const fs::path& folder, const fs::path& file_
     if (is_file(stem + extension)) return stem + extension;
   }
   return std::nullopt;
-}
-
-std::optional<fs::path> find_respelt(const fs::path& folder, const fs::path& file_path) {
-  if (file_path.is_absolute()) return std::nullopt;
-  const fs::path path = file_path.lexically_normal();
-  fs::path place = folder;
-  for (const fs::path& part : path.parent_path()) {
-    const auto found = find_folder(place, part.string());
-    if (!found) return std::nullopt;
-    place = *found;
-  }
-  const std::string name = path.filename().string();
-  const bool named = has_image_extension(path);
-  return only_entry(place, [&](const fs::path& entry) {
-    return same_but_spelling((named ? entry.filename() : entry.stem()).string(), name) &&
-           has_image_extension(entry) && is_file(entry);
-  });
 }
 
 std::optional<fs::path> find_reformatted(const fs::path& folder, const fs::path& file_path) {
@@ -157,11 +146,44 @@ fs::path find_beside(const fs::path& folder, const fs::path& file_path, std::siz
   return find_moved(folder, file_path, least_parts).value_or(folder / file_path);
 }
 
-std::optional<fs::path> find_folder(const fs::path& folder, std::string_view name) {
+std::optional<fs::path> RespeltFinder::find(const fs::path& folder, const fs::path& file_path) {
+  if (file_path.is_absolute()) return std::nullopt;
+  const fs::path path = file_path.lexically_normal();
+  fs::path place = folder;
+  for (const fs::path& part : path.parent_path()) {
+    const auto found = find_folder(place, part.string());
+    if (!found) return std::nullopt;
+    place = *found;
+  }
+  const std::string name = path.filename().string();
+  const bool named = has_image_extension(path);
+  const Listing& entries = listing(place);
+  return only_entry(
+      place, named ? entries.by_name : entries.by_stem, name, [&](const fs::path& entry) {
+        return same_but_spelling((named ? entry.filename() : entry.stem()).string(), name) &&
+               has_image_extension(entry) && is_file(entry);
+      });
+}
+
+std::optional<fs::path> RespeltFinder::find_folder(const fs::path& folder, std::string_view name) {
   if (is_folder(folder / name)) return folder / name;
-  return only_entry(folder, [&](const fs::path& entry) {
+  return only_entry(folder, listing(folder).by_name, name, [&](const fs::path& entry) {
     return same_but_spelling(entry.filename().string(), name) && is_folder(entry);
   });
+}
+
+const RespeltFinder::Listing& RespeltFinder::listing(const fs::path& folder) {
+  const auto [known, is_new] = listings_.try_emplace(folder);
+  Listing& out = known->second;
+  if (!is_new) return out;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    out.by_name.emplace(folded(name), name);
+    out.by_stem.emplace(folded(entry->path().stem().string()), name);
+  }
+  return out;
 }
 
 }  // namespace raysplats::io

@@ -3,7 +3,9 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace raysplats::io {
@@ -12,12 +14,6 @@ namespace raysplats::io {
 /// when absent.
 std::optional<std::filesystem::path> find_image(const std::filesystem::path& folder,
                                                 const std::filesystem::path& file_path);
-
-/// The single image that differs from that path in letter case alone, in folders or name, or in
-/// that the marks of its letters are characters of their own: systems that do not tell them apart
-/// have written the path. Reads the folder from end to end.
-std::optional<std::filesystem::path> find_respelt(const std::filesystem::path& folder,
-                                                  const std::filesystem::path& file_path);
 
 /// The single image that differs from that path in its extension alone: photos were converted, or
 /// the path says .jpeg of a .jpg.
@@ -36,8 +32,30 @@ std::filesystem::path find_beside(const std::filesystem::path& folder,
                                   const std::filesystem::path& file_path,
                                   std::size_t least_parts);
 
-/// The folder of that name in another, spelt as find_respelt() says, the exact one first.
-std::optional<std::filesystem::path> find_folder(const std::filesystem::path& folder,
-                                                 std::string_view name);
+/// Finds what differs from a name in letter case alone, or in that the marks of its letters are
+/// characters of their own: systems that do not tell them apart have written the name. A folder is
+/// listed once, when the first name is sought in it, and what is put there later stays unknown.
+class RespeltFinder {
+ public:
+  /// The single image that differs so from that path, in folders or name; the path is relative to
+  /// `folder` and may have no extension.
+  std::optional<std::filesystem::path> find(const std::filesystem::path& folder,
+                                            const std::filesystem::path& file_path);
+
+  /// The folder of that name in another, or the single one that differs from it so.
+  std::optional<std::filesystem::path> find_folder(const std::filesystem::path& folder,
+                                                   std::string_view name);
+
+ private:
+  /// Names of entries by what they are in small letters without marks.
+  using Names = std::multimap<std::string, std::string>;
+  struct Listing {
+    Names by_name;
+    Names by_stem;
+  };
+  const Listing& listing(const std::filesystem::path& folder);
+
+  std::map<std::filesystem::path, Listing> listings_;
+};
 
 }  // namespace raysplats::io

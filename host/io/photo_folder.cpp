@@ -35,39 +35,42 @@ bool has_photos_of(const fs::path& folder, const ColmapModel& model) {
 }
 
 /// Whether the folder has any photo of the model.
-bool has_photo_of(const fs::path& folder, const ColmapModel& model) {
+bool has_photo_of(const fs::path& folder, const ColmapModel& model, RespeltFinder& respelt) {
   const auto is_there = [&](const ColmapImage& image) {
     return find_photo(folder, image.name).has_value();
   };
   return std::any_of(model.images.begin(), model.images.end(), is_there) ||
-         (!model.images.empty() && find_respelt(folder, model.images.front().name));
+         (!model.images.empty() && respelt.find(folder, model.images.front().name));
 }
 
 /// Where the photos are if the usual folder has none of them: reduced copies may have other names
 /// (NeRF-LLFF), and names of the model may begin with a folder of the root.
 std::optional<fs::path> fuller_folder(const fs::path& root,
                                       const fs::path& usual,
-                                      const ColmapModel& model) {
-  if (usual == root || has_photo_of(usual, model)) return std::nullopt;
+                                      const ColmapModel& model,
+                                      RespeltFinder& respelt) {
+  if (usual == root || has_photo_of(usual, model, respelt)) return std::nullopt;
   for (const fs::path& folder : {root / "images", root}) {
-    if (folder != usual && has_photo_of(folder, model)) return folder;
+    if (folder != usual && has_photo_of(folder, model, respelt)) return folder;
   }
   return std::nullopt;
 }
 
 /// A folder of another name that has the model's first photo, where that is not beside the model.
-std::optional<fs::path> other_folder(const fs::path& root, const ColmapModel& model) {
+std::optional<fs::path> other_folder(const fs::path& root,
+                                     const ColmapModel& model,
+                                     RespeltFinder& respelt) {
   if (model.images.empty() || find_photo(root, model.images.front().name)) return std::nullopt;
   for (const char* name : kFolderNames) {
-    auto folder = find_folder(root, name);
+    auto folder = respelt.find_folder(root, name);
     if (folder && find_photo(*folder, model.images.front().name)) return folder;
   }
   return std::nullopt;
 }
 
-std::size_t photos_in(const fs::path& folder, const ColmapModel& model) {
+std::size_t photos_in(const fs::path& folder, const ColmapModel& model, RespeltFinder& respelt) {
   const auto is_there = [&](const ColmapImage& image) {
-    return find_photo(folder, image.name) || find_respelt(folder, image.name);
+    return find_photo(folder, image.name) || respelt.find(folder, image.name);
   };
   return static_cast<std::size_t>(
       std::count_if(model.images.begin(), model.images.end(), is_there));
@@ -100,8 +103,10 @@ void warn_of_size(const PhotoFolder& copies, const fs::path& images, const Colma
 /// Reduced copies, or `images` in the place of those that lack photos which it has.
 PhotoFolder fuller_copies(const PhotoFolder& copies,
                           const fs::path& images,
-                          const ColmapModel& model) {
-  const std::size_t reduced = photos_in(copies.path, model), whole = photos_in(images, model);
+                          const ColmapModel& model,
+                          RespeltFinder& respelt) {
+  const std::size_t reduced = photos_in(copies.path, model, respelt);
+  const std::size_t whole = photos_in(images, model, respelt);
   if (reduced >= whole) {
     warn_of_size(copies, images, model);
     return copies;
@@ -159,17 +164,18 @@ PhotoFolder usual_photo_folder(const fs::path& root, double downscale) {
 PhotoFolder photo_folder(const fs::path& root, const ColmapModel& model, double downscale) {
   PhotoFolder usual = usual_photo_folder(root, downscale);
   const fs::path input = root / "input", images = root / "images";
+  RespeltFinder respelt;
   // Reduced copies are of `images`.
   const bool has_usual = is_folder(images) ? has_photos_of(images, model) : usual.path != root;
   std::optional<fs::path> found;
   if (!has_usual && is_folder(input) && has_photos_of(input, model)) found = input;
-  if (!found && usual.path == root) found = other_folder(root, model);
-  if (!found && (found = fuller_folder(root, usual.path, model))) {
+  if (!found && usual.path == root) found = other_folder(root, model, respelt);
+  if (!found && (found = fuller_folder(root, usual.path, model, respelt))) {
     spdlog::info("{} has no photo of the names in the model: those in {} are used",
                  usual.path.string(), found->string());
     return {*found, 1.0};
   }
-  if (!found) return usual.factor > 1 ? fuller_copies(usual, images, model) : usual;
+  if (!found) return usual.factor > 1 ? fuller_copies(usual, images, model, respelt) : usual;
   spdlog::info("the photos of the model are those in {}", found->string());
   return {*found, 1.0};
 }

@@ -52,8 +52,9 @@ std::optional<fs::path> mask_named(const fs::path& folder, const std::string& na
 
 /// Where masks lie that nothing names; empty where there is no such folder.
 fs::path mask_folder(const fs::path& root) {
+  RespeltFinder folders;
   for (const char* name : {"masks", "mask", "resized_anon_masks"}) {
-    if (const auto folder = find_folder(root, name)) return *folder;
+    if (const auto folder = folders.find_folder(root, name)) return *folder;
   }
   return {};
 }

@@ -33,13 +33,15 @@ struct FramePhoto {
   bool reformatted = false;  ///< with another extension
 };
 
-std::optional<FramePhoto> frame_photo(const TransformsFile& file, const TransformsFrame& frame) {
+std::optional<FramePhoto> frame_photo(const TransformsFile& file,
+                                      const TransformsFrame& frame,
+                                      RespeltFinder& respelt) {
   const fs::path folder = file.path.parent_path();
   if (frame.file_path.empty()) {
     throw DataError(fmt::format("{}: frame {} has no file_path", file.path.string(), frame.number));
   }
   if (auto photo = find_image(folder, frame.file_path)) return FramePhoto{*photo};
-  if (auto photo = find_respelt(folder, frame.file_path)) return FramePhoto{*photo, false, true};
+  if (auto photo = respelt.find(folder, frame.file_path)) return FramePhoto{*photo, false, true};
   if (auto photo = find_moved(folder, frame.file_path, 1)) return FramePhoto{*photo, true};
   if (auto photo = find_reformatted(folder, frame.file_path))
     return FramePhoto{*photo, false, false, true};
@@ -87,7 +89,9 @@ std::vector<FramePhoto> frame_photos(TransformsFile& file) {
   std::vector<FramePhoto> photos;
   std::vector<TransformsFrame> found, missing;
   std::vector<std::optional<FramePhoto>> hits;
-  for (const TransformsFrame& frame : file.frames) hits.push_back(frame_photo(file, frame));
+  RespeltFinder respelt;
+  for (const TransformsFrame& frame : file.frames)
+    hits.push_back(frame_photo(file, frame, respelt));
   const std::map<fs::path, std::string> in_place = photos_in_place(file, hits);
   const std::set<fs::path> others = other_pictures(file);
   for (std::size_t i = 0; i < hits.size(); ++i) {
@@ -155,8 +159,9 @@ fs::path named_by(const TransformsFile& file,
 }  // namespace
 
 bool has_photos(const TransformsFile& file) {
+  RespeltFinder respelt;
   return std::any_of(file.frames.begin(), file.frames.end(), [&](const TransformsFrame& frame) {
-    return frame_photo(file, frame).has_value();
+    return frame_photo(file, frame, respelt).has_value();
   });
 }
 
