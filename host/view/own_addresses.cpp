@@ -38,13 +38,19 @@ std::vector<std::string> own_addresses(bool ipv6) {
                 "The system does not tell its addresses: give one of them as --host");
   }
   const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> list(first, ::freeifaddrs);
+  return addresses_of(list.get(), ipv6);
+}
+
+std::vector<std::string> addresses_of(const ifaddrs* interfaces, bool ipv6) {
   std::vector<std::string> loopback, others;
-  for (const ifaddrs* each = list.get(); each != nullptr; each = each->ifa_next) {
+  for (const ifaddrs* each = interfaces; each != nullptr; each = each->ifa_next) {
     if (each->ifa_addr == nullptr || !(each->ifa_flags & IFF_UP)) continue;
     std::string text = text_of(*each->ifa_addr, ipv6);
     if (!text.empty()) (each->ifa_flags & IFF_LOOPBACK ? loopback : others).push_back(text);
   }
   loopback.insert(loopback.end(), others.begin(), others.end());
+  // Without interfaces nobody reaches the server, until the loopback is up.
+  if (loopback.empty()) loopback.emplace_back("127.0.0.1");
   return loopback;
 }
 

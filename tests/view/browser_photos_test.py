@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Photos over pictures, and the world's box and directions.
 usage: browser_photos_test.py PROGRAM [FOLDER]     (screenshots go to FOLDER)"""
+import json
 import os
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from page_case import PageCase  # noqa: E402
 from program import write_model  # noqa: E402
 
 
-class PhotoTest(PageCase):
+class PhotoCase(PageCase):
     """A model beside the photos that it was to be like."""
 
     def arguments(self):
@@ -26,10 +27,16 @@ class PhotoTest(PageCase):
         photos = os.path.join(folder, "photos")
         subprocess.run([self.program, "generate", photos, "--size", "64", "--train-views", "3", "--test-views", "2",
                         "-q"], check=True, stdout=subprocess.DEVNULL)
+        self.prepare(photos)
         model = os.path.join(folder, "model.ply")
         write_model(model)
         return [model, "--data", photos, "--split", "train"]
 
+    def prepare(self, photos):
+        """What is done to the data set before it is looked at."""
+
+
+class PhotoTest(PhotoCase):
     def overlay(self, x, y):
         """A pixel of what lies over the picture, at shares of its size."""
         return self.page.execute_script(
@@ -132,6 +139,44 @@ class PhotoTest(PageCase):
         told = subprocess.run([self.program, "convert", self.arguments_given[0], "-o", out, *option],
                               capture_output=True, text=True, check=True).stdout
         self.assertRegex(told, r"^\d+ of 103 Gaussians")
+        self.assertEqual(self.console(), [])
+
+
+class MixedTest(PhotoCase):
+    """Cameras with photos for the page, and one without: a fisheye bends its own."""
+
+    def prepare(self, photos):
+        path = os.path.join(photos, "transforms_train.json")
+        with open(path) as file:
+            cameras = json.load(file)
+        cameras["frames"][2].update(camera_model="OPENCV_FISHEYE", fl_x=64, fl_y=64, cx=32, cy=32)
+        with open(path, "w") as file:
+            json.dump(cameras, file)
+
+    def test_a_photo_that_comes_late_does_not_lie_over_a_camera_that_has_none(self):
+        first = self.rest()
+        self.assertEqual(self.page.execute_async_script(
+            "const done = arguments[0]; fetch('api/state').then(r => r.json())"
+            ".then(s => done(s.cameras.map((c) => c.photo)), (error) => done(String(error)));"), [True, True, False])
+        # The photo's reply waits for release(), which ends when the page has the photo.
+        self.page.execute_script(
+            "const {fetch, createImageBitmap} = window;"
+            "window.fetch = (...asked) => asked[0] !== 'api/photo/1' ? fetch(...asked) : new Promise((reply) => {"
+            " window.release = () => new Promise((taken) => {"
+            "  window.createImageBitmap = async (...given) => {"
+            "   const bitmap = await createImageBitmap(...given); setTimeout(taken, 100); return bitmap; };"
+            "  reply(fetch(...asked)); }); });")
+        cameras = Select(self.page.find_element(By.ID, "cameras"))
+        cameras.select_by_index(1)
+        second = self.rest(first["id"])
+        cameras.select_by_index(2)
+        third = self.rest(second["id"])
+        self.assertEqual(self.page.execute_async_script(
+            "const done = arguments[0]; window.release().then(() => done(window.raysplats.photo.number));"), -1)
+        # What draws over the picture goes on.
+        self.drag(60, 0)
+        self.rest(third["id"])
+        self.assertFalse(self.page.find_element(By.ID, "photo-section").is_displayed())
         self.assertEqual(self.console(), [])
 
 

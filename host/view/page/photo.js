@@ -30,8 +30,8 @@ export class Photo {
     this.#camera = camera.photo ? camera : null;
     this.#bitmap = null;
     this.#number = number;
-    if (!this.#camera) return;
     const asked = ++this.#asked;
+    if (!this.#camera) return;
     const bitmap = await fetchPhoto(number);
     if (asked !== this.#asked) return;
     this.#bitmap = bitmap;

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "view/access.hpp"
 
+#include <arpa/inet.h>
 #include <doctest/doctest.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <netinet/in.h>
 
 #include <algorithm>
 #include <string>
@@ -89,6 +93,19 @@ TEST_CASE("this machine has a loopback address, which comes first") {
   for (const std::string& each : addresses) CHECK(each.find(':') == std::string::npos);
   const std::vector<std::string> all = own_addresses(true);
   for (const std::string& each : addresses) CHECK(std::count(all.begin(), all.end(), each) == 1);
+}
+
+TEST_CASE("a machine whose interfaces are all down has the loopback's address all the same") {
+  CHECK(addresses_of(nullptr, false) == std::vector<std::string>{"127.0.0.1"});
+  CHECK(addresses_of(nullptr, true) == std::vector<std::string>{"127.0.0.1"});
+  sockaddr_in number{};
+  number.sin_family = AF_INET;
+  number.sin_addr.s_addr = htonl(0xc0000207);  // 192.0.2.7
+  ifaddrs card{};
+  card.ifa_addr = reinterpret_cast<sockaddr*>(&number);
+  CHECK(addresses_of(&card, true) == std::vector<std::string>{"127.0.0.1"});
+  card.ifa_flags = IFF_UP;
+  CHECK(addresses_of(&card, true) == std::vector<std::string>{"192.0.2.7"});
 }
 
 TEST_CASE("tokens are random and secrets are compared whole") {
