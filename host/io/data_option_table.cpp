@@ -77,9 +77,8 @@ void add_data_options(OptionTable& table, DatasetOptions& options) {
       "alpha", options.alpha,
       {{"auto", AlphaUse::kAuto}, {"ignore", AlphaUse::kIgnore}, {"cutout", AlphaUse::kCutout}},
       "what is transparent in photos: ignore (it counts neither in the loss nor in metrics), "
-      "cutout "
-      "(background) or auto (cutout where most photos have something transparent, but for a border "
-      "that is the same in all)");
+      "cutout (background) or auto (cutout where most photos have something transparent, but for "
+      "holes and a border that is the same in all)");
   table.choice<BorderUse>(
       "borders", options.borders, {{"auto", BorderUse::kAuto}, {"keep", BorderUse::kKeep}},
       "black borders that all photos have, as the bars of a video or around the circle of a "

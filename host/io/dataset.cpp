@@ -222,12 +222,17 @@ bool shows_cut_outs(const Dataset& dataset, AlphaUse use) {
         "makes it background)",
         exact ? "" : "about ", count, dataset.views.size());
   }
-  // Rendered photos have no lens that leaves a border.
+  // Rendered photos have no lens that leaves a border, and nobody cuts anything out of them.
   if (dataset.kind == DatasetKind::kBlender) return kind != io::Transparency::kNone;
   if (kind == io::Transparency::kBorder) {
     spdlog::info(
         "All photos are transparent in the same places, as at the edge of a lens: these do not "
         "count (alpha = cutout makes them background)");
+  }
+  if (kind == io::Transparency::kHoles) {
+    spdlog::info(
+        "The photos have holes: what is transparent in them lies around no body and does not count "
+        "(alpha = cutout makes it background)");
   }
   if (kind == io::Transparency::kCutOut) {
     spdlog::info(
@@ -248,8 +253,8 @@ void leave_out_borders(Dataset& dataset) {
   spdlog::log(
       share > kUsualShare ? spdlog::level::warn : spdlog::level::info,
       "photos of the size of {} have the same black border, of {:.0f} % of their pixels, as the "
-      "bars of a video: in {} of {} photos it does not count (with borders = keep it is a part of "
-      "the scene)",
+      "bars of a video, around a lens's circle or beyond a lamp's light: in {} of {} photos it "
+      "does not count (with borders = keep it is a part of the scene)",
       first->image_path.string(), std::max(1.0, 100.0 * share),
       std::count_if(dataset.views.begin(), dataset.views.end(), has_border), dataset.views.size());
 }

@@ -28,6 +28,8 @@ constexpr double kOpaque = 0.9;
 constexpr double kFew = 0.01;
 constexpr double kWidestBorder = 1.0 / 3.0;
 constexpr double kSame = 0.01;
+// Of the outermost places: around a body that was cut out more are transparent, but for close-ups.
+constexpr double kLeastFrame = 0.1;
 
 using Places = std::bitset<kPlaces>;
 
@@ -67,6 +69,27 @@ Places transparent_places(const View& view) {
   }
 }
 
+Places outermost_places() {
+  Places out;
+  for (std::size_t i = 0; i < kSide; ++i) {
+    for (const std::size_t place : {i, kPlaces - 1 - i, i * kSide, (i + 1) * kSide - 1})
+      out.set(place);
+  }
+  return out;
+}
+
+// Whether the photos are opaque along their edges, as the median has it: some photos of a body may
+// be close-ups, and a hole may reach an edge.
+bool have_holes(std::span<const Places> photos) {
+  const Places frame = outermost_places();
+  std::vector<std::size_t> counts;
+  counts.reserve(photos.size());
+  for (const Places& places : photos) counts.push_back((places & frame).count());
+  const auto middle = counts.begin() + static_cast<std::ptrdiff_t>(counts.size() / 2);
+  std::nth_element(counts.begin(), middle, counts.end());
+  return static_cast<double>(*middle) < kLeastFrame * static_cast<double>(frame.count());
+}
+
 }  // namespace
 
 TransparentPhotos transparency(std::span<const View> views) {
@@ -94,7 +117,11 @@ TransparentPhotos transparency(std::span<const View> views) {
     return share(places) <= kWidestBorder && share(places ^ photos.front()) <= kSame;
   });
   // One photo alone tells of no border that all have.
-  out.kind = border && photos.size() > 1 ? Transparency::kBorder : Transparency::kCutOut;
+  if (border && photos.size() > 1) {
+    out.kind = Transparency::kBorder;
+  } else {
+    out.kind = have_holes(photos) ? Transparency::kHoles : Transparency::kCutOut;
+  }
   return out;
 }
 

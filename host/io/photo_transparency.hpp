@@ -12,6 +12,7 @@ namespace raysplats::io {
 enum class Transparency {
   kNone,    ///< nothing, or in few of them
   kBorder,  ///< the same small part of all: what a lens or its correction does not fill
+  kHoles,   ///< parts within them, as of a person who was cut away
   kCutOut,  ///< what lies around a body that was cut out
 };
 

@@ -28,8 +28,8 @@ enum class MaskUse {
 
 /// What is transparent in photos.
 enum class AlphaUse {
-  kAuto,    ///< kCutout where most photos have something transparent, but for a border that is the
-            ///< same in all of them; else kIgnore
+  kAuto,    ///< kCutout where most photos have something transparent, but for holes and a border
+            ///< that is the same in all of them; else kIgnore
   kIgnore,  ///< unknown, as what MaskUse::kIgnore ignores
   kCutout,  ///< background: the photos show a body that was cut out
 };

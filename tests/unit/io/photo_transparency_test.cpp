@@ -27,6 +27,11 @@ float body(int photo, int x, int y) {
   return x >= 5 + photo && x < 20 + photo && y >= 5 && y < 25 ? 1.0f : 0.0f;
 }
 
+// A car that was cut away, in another place in each photo.
+float holes(int photo, int x, int y) {
+  return x >= 3 + 2 * photo && x < 15 + 2 * photo && y >= 12 && y < 22 ? 0.0f : 1.0f;
+}
+
 // Two corners that a lens does not fill.
 float corners(int /*photo*/, int x, int y) { return x + y < 8 || x + y > 61 ? 0.0f : 1.0f; }
 
@@ -134,6 +139,40 @@ TEST_CASE("a border that all photos share is unknown, unless they are rendered o
   const Scratch rendered;
   write_photos(rendered, corners, "transforms_train.json");
   CHECK(background(rendered));
+}
+
+TEST_CASE("holes in photos are unknown, unless the photos are rendered") {
+  const Scratch scratch;
+  write_photos(scratch, holes);
+  {
+    const LogCapture log;
+    const Dataset dataset = load_dataset(scratch.path());
+    CHECK_FALSE(dataset.alpha_is_background);
+    CHECK(io::transparency(dataset.views).kind == io::Transparency::kHoles);
+    CHECK(load_view_picture(dataset.views[0]).rgba.at(5, 15, 3) == 0.0f);
+    CHECK(log.contains("The photos have holes"));
+    CHECK(log.contains("alpha = cutout makes it background"));
+    CHECK(log.lines() == 1);
+  }
+  CHECK(background(scratch, AlphaUse::kCutout));
+  const Scratch rendered;
+  write_photos(rendered, holes, "transforms_train.json");
+  CHECK(background(rendered));
+}
+
+TEST_CASE("the median photo tells holes from a body that fills some of its photos") {
+  const Scratch scratch;
+  const auto close_up = [](int photo, int x, int y) {
+    return x < 20 + photo && y > 3 ? 1.0f : 0.0f;
+  };
+  for (const int others : {3, 7}) {
+    CAPTURE(others);
+    // Where the edge is opaque there is a hole, as between an arm and the body.
+    write_photos(scratch, [&](int photo, int x, int y) {
+      return photo < others ? close_up(photo, x, y) : holes(photo, x, y);
+    });
+    CHECK(background(scratch) == (others > kPhotos / 2));
+  }
 }
 
 TEST_CASE("a mask of cut-out photos is a plane of its own, whoever wrote the data set") {
