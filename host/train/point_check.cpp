@@ -23,6 +23,7 @@ constexpr std::size_t kLooks = 2000;    // points that are looked at
 constexpr std::size_t kFewLooks = 100;  // that the photos see; fewer tell nothing
 constexpr double kLeastSeen = 0.3;
 constexpr double kMostDifference = 0.77;
+constexpr double kSound = 0.1;              // of points that are where they belong
 constexpr double kClearlyBetter = 0.6;      // at another scale
 constexpr std::size_t kFewerLooks = 500;    // at every scale
 constexpr int kScaleSteps = 20;             // of half an octave, up and down
@@ -292,8 +293,10 @@ PointCloud beside_points(const PointCloud& found,
 
 bool plausible(const PointMatch& match) {
   const double difference = match.difference.value_or(0);
-  return match.seen >= kLeastSeen && difference <= kMostDifference &&
-         match.scaled_difference >= kClearlyBetter * difference;
+  // Small points on the black between lamps have the photos' colours as well.
+  const bool in_place =
+      difference <= kSound || match.scaled_difference >= kClearlyBetter * difference;
+  return match.seen >= kLeastSeen && difference <= kMostDifference && in_place;
 }
 
 }  // namespace raysplats

@@ -80,6 +80,33 @@ TEST_CASE("points in other units or axes than the cameras are told from those in
   CHECK(larger.scaled_difference < 0.2 * *larger.difference);
 }
 
+TEST_CASE("points in place are believed at night, though smaller ones lie on as much black") {
+  // Lamps on a wall that is all but black.
+  const auto night = [](const CameraRay& ray) {
+    const double t = (4.0 - ray.origin.x) / ray.direction.x;
+    const glm::dvec3 p = ray.origin + t * ray.direction;
+    const glm::dvec2 apart(std::remainder(p.y, 0.9), std::remainder(p.z - 0.4, 0.9));
+    const double light = glm::length(apart) < 0.06 ? 1.0 : 0.0;
+    return glm::max(glm::dvec4(light, light, light, 1.0), 0.02 * wall(ray));
+  };
+  std::vector<SmallPhoto> photos;
+  for (const SmallPhoto& photo : photos_of_wall()) photos.push_back(photo_of(photo.camera, night));
+  PointCloud points = points_of_wall([](const glm::dvec3& p) { return p; });
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    const glm::dvec4 color = night({{0, 0, 0}, glm::dvec3(p[0], p[1], p[2]) / 4.0, true});
+    for (int k = 0; k < 3; ++k) points.colors[3 * i + k] = static_cast<float>(color[k]);
+  }
+  const PointMatch match = match_points(points, cameras_of(photos), photos);
+  REQUIRE(match.difference);
+  MESSAGE("differs by " << *match.difference << ", and by " << match.scaled_difference << " at "
+                        << match.scale << " times the size");
+  CHECK(plausible(match));
+  // As in a capture of such lamps.
+  CHECK(plausible({1.0, 0.07, 0.0625, 0.01}));
+  CHECK_FALSE(plausible({1.0, 0.5, 0.25, 0.05}));
+}
+
 TEST_CASE("points without colours, or that few photos see, are believed") {
   const std::vector<SmallPhoto> photos = photos_of_wall();
   const std::vector<Camera> cameras = cameras_of(photos);
