@@ -129,16 +129,24 @@ Dataset load(const CLI::App& command, Options& options, const DeviceInfo& device
 
 /// Sets the length of a run by --time, and says beforehand how long it will take. Returns its
 /// iterations.
-std::int64_t announce(Trainer& trainer, const Options& options, bool quiet) {
+std::int64_t announce(Trainer& trainer, const Options& options, bool quiet, bool show_progress) {
   constexpr double kMeasureSeconds = 3;
   constexpr double kLongSeconds = 3600;
   const bool fits = !options.time.empty();
   if (!fits && (quiet || !options.resume.empty())) return trainer.iterations();
-  const RunEstimate estimate = fits ? trainer.fit_time(parse_duration("--time", options.time))
-                                    : trainer.estimate(kMeasureSeconds);
+  const RunEstimate estimate =
+      fits ? trainer.fit_time(parse_duration("--time", options.time), show_progress)
+           : trainer.estimate(kMeasureSeconds, show_progress);
   const bool long_by_default = !fits && options.quality.empty() && estimate.seconds > kLongSeconds;
-  spdlog::info("{} iterations, up to {} Gaussians: about {} of training{}", estimate.iterations,
-               estimate.gaussians, format_duration(estimate.seconds),
+  std::string more;
+  if (estimate.evaluations > 0) {
+    more = fmt::format(", not counting {} of {}{}",
+                       counted(static_cast<double>(estimate.evaluations), "evaluation"),
+                       counted(static_cast<double>(estimate.evaluated_views), "view"),
+                       estimate.evaluations > 1 ? " in all" : "");
+  }
+  spdlog::info("{} iterations, up to {} Gaussians: about {} of training{}{}", estimate.iterations,
+               estimate.gaussians, format_duration(estimate.seconds), more,
                long_by_default ? " (--quality medium or --time 30m are shorter)" : "");
   return estimate.iterations;
 }
@@ -224,7 +232,7 @@ void train(const CLI::App& command,
            const GlobalOptions& global,
            Communicator& ranks,
            Context& context) {
-  const bool quiet = global.quiet;
+  const bool show_progress = !global.quiet && ranks.leads();
   Dataset dataset = load(command, options, context.device());
   check_not_data(options.output, dataset);
   std::vector<View> views;
@@ -237,13 +245,13 @@ void train(const CLI::App& command,
                   &ranks);
   trainer.set_command(global.command);
   if (!options.resume.empty()) trainer.resume(options.resume);
-  options.train.iterations = announce(trainer, options, ranks.broadcast_value(0, quiet));
+  options.train.iterations =
+      announce(trainer, options, ranks.broadcast_value(0, global.quiet), show_progress);
   std::unique_ptr<view::RunView> shown;
   if (options.view && ranks.leads()) shown = show(context, trainer, options, views, origin);
   const std::int64_t begun = trainer.iteration();
   const Communicator::Traffic before = ranks.traffic();
-  const TrainSummary summary =
-      run_to_end(trainer, options, !quiet && ranks.leads(), ranks, shown.get());
+  const TrainSummary summary = run_to_end(trainer, options, show_progress, ranks, shown.get());
   if (!ranks.leads()) return;
 
   print_results(summary, options.output);
@@ -290,8 +298,9 @@ Command add_train_command(CLI::App& app, const GlobalOptions& global) {
       ->type_name("RUN");
   command
       ->add_option("--time", options->time,
-                   "Train for that long (90s, 15m, 1.5h): measures a twentieth of it, then fixes "
-                   "--iterations and --max-gaussians, which RUN/config.toml names")
+                   "Train for that long (90s, 15m, 1.5h), evaluations not counted: measures a "
+                   "twentieth of it, then fixes --iterations and --max-gaussians, which "
+                   "RUN/config.toml names")
       ->type_name("TIME");
   command
       ->add_option("--quality", options->quality,

@@ -1,22 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// An affine colour of each photo: x'[c] = x[c] + sum_k d[c][k] x[k] + d[c][3], with 12 numbers d a
-// photo whose mean over all photos is zero (Kerbl et al. 2024 have such a matrix, without the
-// mean, and train it).
+// An affine colour of each photo: x'[c] = x[c] + sum_k d[c][k] z[k], with 12 numbers d a photo
+// whose mean over the photos that steps show is zero (Kerbl et al. 2024 have such a matrix, without
+// the mean, and train it). z = (x, 1); where photos are cut out (CUT_OUT) it is the light of the
+// Gaussians and their coverage, (x - (1 - A) b, A), since no exposure changes the background b.
 //
 // apply_exposure: one work-item per pixel. image, out: planar R, G, B, A; A is copied.
-// exposure_backward: one work-item per pixel. Turns gradient = dL/dx' into dL/dx in place.
-// exposure_moments: one work-item per block of BLOCK pixels. With z = (x, 1), the photo's colour y
-//   and its weight m (`composite` as in train/loss_prepare.cl), partials[24 block + j] are the sums
-//   of m z[a] z[b] (10 for a <= b, row by row) and of m z[a] (y[c] - x[c]) (4 for each c), then two
-//   zeros.
+// exposure_backward: one work-item per pixel. Turns gradient = dL/dx' into dL/dx in place. Where
+//   photos are cut out it adds to dL/dA what x' has of A by z.
+// exposure_moments: one work-item per block of BLOCK pixels. With the photo's straight colour y and
+//   its weight m, alpha times what its plane of weights says (`composite` as in
+//   train/loss_prepare.cl), partials[24 block + j] are the sums of m z[a] z[b] (10 for a <= b, row
+//   by row) and of m z[a] (z[3] y[c] - z[c]) (4 for each c), then the sum of m and a zero.
 // exposure_sums: one work-group of GROUP work-items per sum, 24 in all. Adds the partials, as those
 //   of one view of a step: sums[24 slot + j].
 // exposure_solve: one work-group of GROUP work-items. The first makes the rows d[c] of the photo of
 //   a slot what minimises
-//   sum m (d[c] z - (y[c] - x[c]))^2 / sum m + damping |d[c] - before|^2 (a step of the proximal
-//   point method, Rockafellar 1976), by Cholesky's factors of a 4 x 4 matrix whose eigenvalues are
-//   at least `damping`; then all of them take the mean over the photos off. Does nothing where the
-//   guard's word is not 0, nothing of the photo counts, or a sum is not finite.
+//   sum m (d[c] z - (z[3] y[c] - z[c]))^2 / sum m + damping |d[c] - before|^2 (a step of the
+//   proximal point method, Rockafellar 1976), by Cholesky's factors of a 4 x 4 matrix whose
+//   eigenvalues are at least `damping`; then all of them take the mean over the photos off.
+//   `members` photos have part in it: all, or where these are fewer than the `views`, those whose
+//   word in `waits` is 0. Does nothing where the guard's word is not 0, nothing of the photo
+//   counts, or a sum is not finite.
 // Sums over blocks and photos: a work-item adds every GROUP-th, and what the work-items have is
 // added in a tree, so that their order is the same everywhere.
 // Complexity: pixels + (blocks + photos) / GROUP.
@@ -29,30 +33,50 @@
 #ifndef GROUP
 #define GROUP 64  // a power of two
 #endif
+#ifndef CUT_OUT
+#define CUT_OUT 0
+#endif
 #define SUMS 24
 #define NUMBERS 12
+
+// What the affine colour of a pixel is of.
+void light_of(const __global float* image, size_t pixels, size_t i, const float* behind, float* z) {
+  z[3] = CUT_OUT ? image[3 * pixels + i] : 1.0f;
+  for (int c = 0; c < 3; ++c) {
+    z[c] = image[c * pixels + i];
+    if (CUT_OUT) z[c] -= (1.0f - z[3]) * behind[c];
+  }
+}
 
 __kernel void apply_exposure(const __global float* image,
                              const __global float* deltas,
                              __global float* out,
                              uint pixels,
-                             uint view) {
+                             uint view,
+                             float red,
+                             float green,
+                             float blue) {
   const size_t i = get_global_id(0);
   if (i >= pixels) return;
   const __global float* d = deltas + 12 * (size_t)view;
-  const float r = image[i];
-  const float g = image[pixels + i];
-  const float b = image[2 * (size_t)pixels + i];
-  out[i] = r + d[0] * r + d[1] * g + d[2] * b + d[3];
-  out[pixels + i] = g + d[4] * r + d[5] * g + d[6] * b + d[7];
-  out[2 * (size_t)pixels + i] = b + d[8] * r + d[9] * g + d[10] * b + d[11];
-  out[3 * (size_t)pixels + i] = image[3 * (size_t)pixels + i];
+  const size_t plane = pixels;
+  const float behind[3] = {red, green, blue};
+  float z[4];
+  light_of(image, plane, i, behind, z);
+  for (int c = 0; c < 3; ++c) {
+    out[c * plane + i] = image[c * plane + i] + d[4 * c] * z[0] + d[4 * c + 1] * z[1] +
+                         d[4 * c + 2] * z[2] + d[4 * c + 3] * z[3];
+  }
+  out[3 * plane + i] = image[3 * plane + i];
 }
 
 __kernel void exposure_backward(const __global float* deltas,
                                 __global float* gradient,
                                 uint pixels,
-                                uint view) {
+                                uint view,
+                                float red,
+                                float green,
+                                float blue) {
   const size_t i = get_global_id(0);
   if (i >= pixels) return;
   const size_t plane = pixels;
@@ -60,6 +84,14 @@ __kernel void exposure_backward(const __global float* deltas,
   const float g[3] = {gradient[i], gradient[plane + i], gradient[2 * plane + i]};
   for (int k = 0; k < 3; ++k)
     gradient[k * plane + i] = g[k] + d[k] * g[0] + d[4 + k] * g[1] + d[8 + k] * g[2];
+  if (CUT_OUT) {
+    float by_coverage = 0.0f;
+    for (int c = 0; c < 3; ++c) {
+      by_coverage +=
+          g[c] * (d[4 * c] * red + d[4 * c + 1] * green + d[4 * c + 2] * blue + d[4 * c + 3]);
+    }
+    gradient[3 * plane + i] += by_coverage;
+  }
 }
 
 __kernel void exposure_moments(const __global float* image,
@@ -80,20 +112,19 @@ __kernel void exposure_moments(const __global float* image,
   for (int j = 0; j < SUMS; ++j) sum[j] = 0.0f;
   for (int i = begin; i < end; ++i) {
     const float alpha = rs_photo_channel(photo, planes, pixels, i, 1, 3);
-    const float share = composite ? alpha : 1.0f;
     const float weight =
-        composite == 0 ? alpha
-                       : (composite == 1 ? 1.0f : rs_photo_weight(photo, planes, pixels, i, 1));
-    const float z[4] = {image[i], image[(size_t)pixels + i], image[2 * (size_t)pixels + i], 1.0f};
+        composite == 2 ? alpha * rs_photo_weight(photo, planes, pixels, i, 1) : alpha;
+    float z[4];
+    light_of(image, pixels, i, behind, z);
     int j = 0;
     for (int a = 0; a < 4; ++a) {
       for (int b = a; b < 4; ++b) sum[j++] += weight * z[a] * z[b];
     }
     for (int c = 0; c < 3; ++c) {
-      const float y =
-          rs_photo_channel(photo, planes, pixels, i, 1, c) * share + behind[c] * (1.0f - share);
-      for (int a = 0; a < 4; ++a) sum[j++] += weight * z[a] * (y - z[c]);
+      const float y = rs_photo_channel(photo, planes, pixels, i, 1, c);
+      for (int a = 0; a < 4; ++a) sum[j++] += weight * z[a] * (z[3] * y - z[c]);
     }
+    sum[j] += weight;
   }
   for (int j = 0; j < SUMS; ++j) partials[SUMS * (size_t)block + j] = sum[j];
 }
@@ -128,12 +159,12 @@ int tells(const __global float* s) {
   for (int j = 0; j < SUMS; ++j) {
     if ((as_uint(s[j]) & 0x7f800000u) == 0x7f800000u) return 0;
   }
-  return s[9] > 0.0f;  // the sum of the weights
+  return s[22] > 0.0f;  // the sum of the weights
 }
 
 // The numbers d of a photo by its sums s.
 void fit_colors(const __global float* s, __global float* d, float damping) {
-  const float all = s[9];
+  const float all = s[22];
   float L[4][4];  // the lower factor; its diagonal inverted
   int j = 0;
   for (int a = 0; a < 4; ++a) {
@@ -165,9 +196,11 @@ void fit_colors(const __global float* s, __global float* d, float damping) {
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void exposure_solve(
     const __global float* sums,
     const __global uint* guard,
+    const __global uint* waits,
     __global float* deltas,
     uint slot,
     uint views,
+    uint members,
     uint view,
     float damping) {
   __local float rows[NUMBERS * GROUP];
@@ -179,13 +212,15 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void exposure_solve(
   float sum[NUMBERS];
   for (int k = 0; k < NUMBERS; ++k) sum[k] = 0.0f;
   for (uint v = lane; v < views; v += GROUP) {
+    if (members < views && waits[v]) continue;
     for (int k = 0; k < NUMBERS; ++k) sum[k] += deltas[NUMBERS * (size_t)v + k];
   }
   for (int k = 0; k < NUMBERS; ++k) rows[GROUP * k + lane] = sum[k];
   add_rows(rows, NUMBERS);
   if (!fits) return;
-  for (int k = 0; k < NUMBERS; ++k) sum[k] = rows[GROUP * k] / views;  // the mean
+  for (int k = 0; k < NUMBERS; ++k) sum[k] = rows[GROUP * k] / members;  // the mean
   for (uint v = lane; v < views; v += GROUP) {
+    if (members < views && waits[v]) continue;
     for (int k = 0; k < NUMBERS; ++k) deltas[NUMBERS * (size_t)v + k] -= sum[k];
   }
 }

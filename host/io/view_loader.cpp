@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 
 #include "raysplats/error.hpp"
 
@@ -93,6 +94,15 @@ std::shared_ptr<const Photo> ViewLoader::get(std::size_t index) {
   }
   if (entry.waiting == 0 && cached_bytes_ > budget_) make_room(0);
   return image;
+}
+
+bool ViewLoader::wait(std::size_t index, double seconds) {
+  std::unique_lock lock(mutex_);
+  if (index >= views_.size()) return true;
+  const Entry& entry = entries_[index];
+  return finished_.wait_for(lock, std::chrono::duration<double>(seconds), [&] {
+    return entry.state == State::kReady || entry.state == State::kFailed;
+  });
 }
 
 void ViewLoader::forget(std::size_t index) {

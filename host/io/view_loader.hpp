@@ -40,6 +40,10 @@ class ViewLoader {
   /// call if it still fails.
   std::shared_ptr<const Photo> get(std::size_t index);
 
+  /// Waits at most so many seconds for a picture that prefetch() has asked for; returns whether
+  /// get() has nothing to wait for.
+  bool wait(std::size_t index, double seconds);
+
   /// Keeps this picture no longer: its bytes lie elsewhere.
   void forget(std::size_t index);
 

@@ -226,11 +226,10 @@ std::vector<std::string> warnings_of(const Json& metrics,
   if (!is_complete(metrics)) {
     const double done = number(metrics, "iteration"), all = number(metrics, "iterations");
     // Its last evaluation was broken off.
-    out.push_back(done >= all
-                      ? fmt::format("The run is not over, though all {:.0f} iterations are "
-                                    "done",
-                                    all)
-                      : fmt::format("The run is not over: {:.0f} of {:.0f} iterations", done, all));
+    const bool trained = all > 0 && done >= all;
+    out.push_back(
+        trained ? fmt::format("The run is not over, though all {:.0f} iterations are done", all)
+                : fmt::format("The run is not over: {:.0f} of {:.0f} iterations", done, all));
   }
   const double rays = number(metrics, "traced_rays");
   const double capped = number(metrics, "capped_rays");

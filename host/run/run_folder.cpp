@@ -189,6 +189,18 @@ void RunFolder::remove_model(std::int64_t iteration) const {
   remove_if_empty(file.parent_path());
 }
 
+void RunFolder::remove_evaluation(std::int64_t iteration) const {
+  if (!writes_) return;
+  const std::filesystem::path folder = evaluation_folder(iteration);
+  std::vector<std::filesystem::path> pictures;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() == ".png") pictures.push_back(entry.path());
+  }
+  for (const std::filesystem::path& picture : pictures) remove_file(picture);
+  remove_file(folder / "metrics.json");
+  remove_if_empty(folder);
+}
+
 std::string RunFolder::model_hash(std::int64_t iteration) const {
   return io::file_hash(model_file(path_, iteration)).value_or("");
 }
@@ -202,14 +214,7 @@ void RunFolder::remove_after(std::int64_t iteration) const {
     if (number > iteration) remove_model(number);
   }
   for (const auto& [number, folder] : numbered(path_ / "eval", "iteration_", "")) {
-    if (number <= iteration) continue;
-    std::vector<std::filesystem::path> pictures;
-    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-      if (entry.path().extension() == ".png") pictures.push_back(entry.path());
-    }
-    for (const std::filesystem::path& picture : pictures) remove_file(picture);
-    remove_file(folder / "metrics.json");
-    remove_if_empty(folder);
+    if (number > iteration) remove_evaluation(number);
   }
   if (iteration > 0) return;
   for (const char* report : kReports) remove_file(path_ / report);

@@ -62,6 +62,8 @@ class RunFolder {
                    const TraceOptions& trace,
                    std::int64_t iteration,
                    const std::array<double, 3>& origin = {}) const;
+  /// What evaluate() has written of that iteration.
+  void remove_evaluation(std::int64_t iteration) const;
   bool has_model(std::int64_t iteration) const;
   /// The iteration of the newest model in the folder.
   std::optional<std::int64_t> newest_model() const;

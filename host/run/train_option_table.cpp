@@ -184,8 +184,9 @@ void add_data_options(TrainTable& t, TrainOptions& o) {
   add_data_options(t, o.data);
   t.number(
       "validate-views", o.validate_views, 0, 1e6,
-      "training views that are kept out of the loss until 0.9 of the run, to judge it by every "
-      "tenth of it (test views influence no run); the best model so far is kept; 0 = none");
+      "training views that are kept out of the loss until 0.9 of the run, with poses to its end, "
+      "to judge it by every tenth of it (test views influence no run); the best model so far is "
+      "kept; 0 = none");
   t.number("patience", o.patience, 0, 10,
            "end the run when so many validations in a row were no better than the best one; 0 = "
            "never");
@@ -295,7 +296,7 @@ void add_optimiser_options(TrainTable& t, TrainOptions& o) {
   t.number("opacity-lr", o.opacity_lr.initial, 0, 1e3, "learning rate of the opacity parameters");
   t.fitted_end("opacity-lr", o.opacity_lr, "1.9 / sqrt(iterations), from 0.03 to 0.1");
   t.number("color-range", o.color_range, 0, 1e6,
-           "range of the photos' colours, from the 1st to the 99th percentile of a channel: below "
+           "range of the photos' colours, but for a thousandth of a channel at either end: below "
            "0.8 the next three rates are as much smaller as it is (in fog, at night); 0 = that of "
            "the photos, which the run's configuration then names");
   t.number("sh-lr", o.sh_lr.initial, 0, 1e3, "learning rate of colour (SH band 0)");
@@ -321,8 +322,8 @@ void add_optimiser_options(TrainTable& t, TrainOptions& o) {
   t.share(
       "average-from", o.average_from, true,
       "share of the run, or iteration, from which on the model is the mean of the parameters of "
-      "all steps, once photos have their full size, all SH bands are on and density control is "
-      "over; 0 = never");
+      "all steps, once photos have their full size, all SH bands are on and the number of "
+      "Gaussians no longer grows; 0 = never");
 }
 
 void add_density_options(TrainTable& t, TrainOptions& o) {

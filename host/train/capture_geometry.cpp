@@ -7,7 +7,6 @@
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <glm/trigonometric.hpp>
-#include <limits>
 #include <optional>
 #include <utility>
 
@@ -181,13 +180,6 @@ bool look_elsewhere(std::span<const Camera> held_out, std::span<const Camera> tr
   for (const Camera& camera : trained) halves.push_back(half_angle(camera));
   return turn > std::max(kLeastTurn, kBeyond * median(std::move(halves))) &&
          turn > kTimesUsual * median_turn(axes, axes, true);
-}
-
-double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const Camera& camera : cameras)
-    least = std::min(least, glm::distance(camera.center(), point));
-  return least;
 }
 
 double median_distance(std::span<const Camera> cameras, const glm::dvec3& point) {

@@ -51,9 +51,6 @@ double motion_extent(std::span<const Camera> cameras, double extent);
 /// spread, are compared with all others.
 bool look_elsewhere(std::span<const Camera> held_out, std::span<const Camera> trained);
 
-/// From the point to the nearest camera; infinite without cameras.
-double nearest_distance(std::span<const Camera> cameras, const glm::dvec3& point);
-
 /// Median of the distances from the point to the cameras, each at least 1e-6.
 double median_distance(std::span<const Camera> cameras, const glm::dvec3& point);
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -24,6 +25,7 @@
 #include "train/point_cloud.hpp"
 #include "train/pose_check.hpp"
 #include "train/schedule.hpp"
+#include "util/parallel.hpp"
 
 namespace raysplats {
 namespace {
@@ -59,6 +61,17 @@ PointCloud distinct_points(const PointCloud& points, const std::optional<Bounds>
   std::sort(order.begin(), order.end());
   PointCloud out;
   for (const std::uint32_t i : order) append_point(points, i, out);
+  return out;
+}
+
+// Where the cameras stand, three numbers each.
+std::vector<double> places_of(std::span<const Camera> cameras) {
+  std::vector<double> out;
+  for (const Camera& camera : cameras) {
+    const glm::dvec3 center = camera.center();
+    if (!std::isfinite(center.x + center.y + center.z)) continue;  // which is near nothing
+    out.insert(out.end(), {center.x, center.y, center.z});
+  }
   return out;
 }
 
@@ -302,6 +315,7 @@ Gaussians gaussians_from_points(const PointCloud& points,
                                 std::span<const Camera> cameras) {
   constexpr double kMinScale = 1e-4;  // of the scene extent
   constexpr double kMaxScale = 0.1;   // of the distance to the nearest camera
+  constexpr double kRoom = 1.001;     // more than what rounding does
   PointCloud finite;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const float* p = points.positions.data() + 3 * i;
@@ -315,11 +329,16 @@ Gaussians gaussians_from_points(const PointCloud& points,
   const auto stride = 3 * static_cast<std::size_t>(sh_coefficients(sh_degree));
   const auto parameter = static_cast<float>(logit(opacity));
   const double least = kMinScale * scene_extent(cameras, finite);
-  for (std::size_t i = 0; i < model.size(); ++i) {
+  const std::vector<double> places = places_of(cameras);
+  const KdTree<double> tree(places);
+  in_parallel(model.size(), [&](std::size_t i) {
     const float* p = finite.positions.data() + 3 * i;
-    const double most = kMaxScale * nearest_distance(cameras, {p[0], p[1], p[2]});
     // One that has no neighbours, or all of them in its place, may be as large as any.
-    const double size = distances[i] > 0 ? static_cast<double>(distances[i]) : most;
+    const double size = distances[i] > 0 ? static_cast<double>(distances[i])
+                                         : std::numeric_limits<double>::infinity();
+    // Cameras farther away do not bound it, so that most searches end early.
+    const double within = kRoom * size / kMaxScale;
+    const double most = kMaxScale * tree.nearest_distance({p[0], p[1], p[2]}, within);
     const double scale = std::max(std::min(size, most), least);
     for (std::size_t a = 0; a < 3; ++a) {
       model.means[3 * i + a] = p[a];
@@ -327,7 +346,7 @@ Gaussians gaussians_from_points(const PointCloud& points,
       model.sh[stride * i + a] = static_cast<float>((finite.colors[3 * i + a] - 0.5) / RS_SH0);
     }
     model.opacities[i] = parameter;
-  }
+  });
   return model;
 }
 

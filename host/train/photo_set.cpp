@@ -2,6 +2,8 @@
 #include "train/photo_set.hpp"
 
 #include <algorithm>
+#include <chrono>
+#include <cstdint>
 #include <glm/vec2.hpp>
 #include <glm/vec4.hpp>
 #include <limits>
@@ -10,6 +12,8 @@
 #include "io/view_loader.hpp"
 #include "scene/camera_model.hpp"
 #include "scene/statistics.hpp"
+#include "util/clock.hpp"
+#include "util/progress.hpp"
 
 namespace raysplats {
 namespace {
@@ -17,7 +21,10 @@ namespace {
 constexpr std::size_t kColorBins = 32;  // per channel
 constexpr double kSharedColor = 0.2;    // share of the pixels that makes a colour the ground's
 
-constexpr std::array<double, 2> kColorEnds{0.01, 0.99};  // what few pixels show sets no range
+constexpr double kLookSeconds = 0.5;  // between two looks at how far reading is
+
+// What a few specks show sets no range, but lamps at night do.
+constexpr std::array<double, 2> kColorEnds{0.001, 0.999};
 
 // The pixel that contains an image point.
 struct Pixel {
@@ -81,7 +88,9 @@ std::optional<glm::dvec2> SmallPhoto::sees(const glm::dvec3& world) const {
 
 std::vector<SmallPhoto> load_small_photos(const Dataset& dataset,
                                           std::span<const std::size_t> views,
-                                          int longest) {
+                                          int longest,
+                                          const ReadingProgress& progress) {
+  const auto start = std::chrono::steady_clock::now();
   std::vector<View> small;
   small.reserve(views.size());
   for (const std::size_t index : views) {
@@ -96,7 +105,21 @@ std::vector<SmallPhoto> load_small_photos(const Dataset& dataset,
   std::vector<std::size_t> all(out.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   loader.prefetch(all);
-  for (std::size_t i = 0; i < out.size(); ++i) out[i].picture = loader.get(i);
+  std::optional<Progress> bar;
+  const auto show = [&](std::size_t done) {
+    if (progress.stream == nullptr) return;
+    const auto steps = static_cast<std::int64_t>(done);
+    if (!bar && done < out.size() && seconds_since(start) >= progress.after) {
+      bar.emplace("Reading photos", static_cast<std::int64_t>(out.size()), steps, progress.stream);
+    }
+    if (bar) bar->update(steps, "");
+  };
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    while (!loader.wait(i, kLookSeconds)) show(i);
+    out[i].picture = loader.get(i);
+    show(i + 1);
+  }
+  if (bar) bar->suspend();  // a terminal goes on without it
   return out;
 }
 

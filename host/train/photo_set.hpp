@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdio>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
@@ -33,11 +34,18 @@ struct SmallPhoto {
   std::optional<glm::dvec2> sees(const glm::dvec3& world) const;
 };
 
+/// Where reading photos shows how far it is, once it has taken so long.
+struct ReadingProgress {
+  std::FILE* stream = nullptr;  ///< null: nowhere
+  double after = 2;             ///< seconds
+};
+
 /// The photos of some views, reduced so that their longer side has at most `longest` pixels; for
 /// what looks at all of them before training begins. Throws the DataError of load_view_image().
 std::vector<SmallPhoto> load_small_photos(const Dataset& dataset,
                                           std::span<const std::size_t> views,
-                                          int longest);
+                                          int longest,
+                                          const ReadingProgress& progress = {});
 
 /// Chooses the gains of photos whose exposure or white balance changes, so that all have the same
 /// mean colour, the mean of theirs: a first guess, right where they show much of the same. A photo
@@ -55,8 +63,8 @@ bool shows_anything(std::span<const SmallPhoto> photos);
 /// of a pixel; black when none counts.
 std::array<float, 3> typical_color(std::span<const SmallPhoto> photos);
 
-/// The range that the photos' colours take: from the 1st to the 99th percentile, of the channel
-/// that has the widest. Of pixels that show something and count; at least a step of 8 bits.
+/// The range that the photos' colours take: but for a thousandth at either end, of the channel that
+/// has the widest. Of pixels that show something and count; at least a step of 8 bits.
 double color_range(std::span<const SmallPhoto> photos);
 
 }  // namespace raysplats

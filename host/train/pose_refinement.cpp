@@ -6,6 +6,8 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+#include <iterator>
+#include <numeric>
 #include <utility>
 
 #include "raysplats/error.hpp"
@@ -28,17 +30,38 @@ glm::dvec3 shift_of(const std::vector<float>& deltas, std::size_t view) {
   return {d[0], d[1], d[2]};
 }
 
+// All of so many views but those `apart`.
+std::vector<std::size_t> trained_of(std::size_t views, std::span<const std::size_t> apart) {
+  std::vector<std::size_t> all(views), out;
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  std::set_difference(all.begin(), all.end(), apart.begin(), apart.end(), std::back_inserter(out));
+  return out;
+}
+
+// Those of `views` that are no stray cameras among them.
+std::vector<std::size_t> usual_of(const std::vector<Camera>& cameras,
+                                  const std::vector<std::size_t>& views) {
+  std::vector<Camera> own;
+  own.reserve(views.size());
+  for (const std::size_t view : views) own.push_back(cameras[view]);
+  std::vector<std::size_t> out;
+  for (const std::size_t i : usual_cameras(own)) out.push_back(views[i]);
+  return out;
+}
+
 }  // namespace
 
 PoseRefinement::PoseRefinement(std::vector<Camera> cameras,
                                double extent,
                                std::vector<double> distances,
-                               double prior)
+                               double prior,
+                               std::span<const std::size_t> apart)
     : cameras_(std::move(cameras)),
       extent_(extent),
       distances_(std::move(distances)),
       prior_(prior),
-      usual_(usual_cameras(cameras_)) {
+      trained_(trained_of(cameras_.size(), apart)),
+      usual_(usual_of(cameras_, trained_)) {
   const std::size_t numbers = kNumbers * cameras_.size();
   state_.deltas.resize(numbers);
   state_.first.resize(numbers);
@@ -121,7 +144,7 @@ void PoseRefinement::remove_common_motion() {
   }
   const glm::dvec3 turn = glm::inverse(sum) * right;
   const double scale = square > 0.0 ? along / square : 0.0;
-  for (std::size_t view = 0; view < cameras_.size(); ++view) {
+  for (const std::size_t view : trained_) {
     const glm::dvec3 r = cameras_[view].center() - middle;
     const glm::dvec3 moved = shift + glm::cross(turn, r) + scale * r;
     const glm::dvec3 turned = cameras_[view].rotation * turn;

@@ -16,10 +16,10 @@ namespace raysplats {
 /// Poses of the training photos, trained beside the model where those of the data set are not exact
 /// (phones, rigs, few matches): a turn about the camera's axes and a shift of its centre each, by
 /// Adam (0.9, 0.999) on the gradients of the pictures. Moving all cameras and the scene together
-/// changes no picture, so the motion that the cameras have in common (turn, shift and scale, by
-/// least squares, without stray_cameras()) is taken off after every step: the model stays where the
-/// data set has it, and so do cameras that are not trained. On the host; equal inputs give equal
-/// bits.
+/// changes no picture, so the motion that the trained cameras have in common (turn, shift and
+/// scale, by least squares, without stray_cameras()) is taken off them after every step: the model
+/// stays where the data set has it, and so do cameras that are not trained. On the host; equal
+/// inputs give equal bits.
 ///
 /// A camera that moves sideways and turns back to what it looked at changes its picture far less
 /// than one that does either, so that gradients of centre and turn alone creep along that valley.
@@ -38,11 +38,13 @@ class PoseRefinement {
   /// `distances` are those of what the cameras see (subject_distances()). `prior` is the weight of
   /// half the squared correction (radians and extents) beside a photo's loss: errors of poses are
   /// small and do not agree between photos. It holds the motions of which the photos tell next to
-  /// nothing, where the model's own errors would decide, and leaves the others to the loss.
+  /// nothing, where the model's own errors would decide, and leaves the others to the loss. Views
+  /// `apart` (ascending) are not trained: they have no part in what is common and stay as they are.
   PoseRefinement(std::vector<Camera> cameras,
                  double extent,
                  std::vector<double> distances,
-                 double prior = 0.0);
+                 double prior = 0.0,
+                 std::span<const std::size_t> apart = {});
 
   /// The camera of a photo where it is now, at the size of the data set.
   Camera camera(std::size_t view) const;
@@ -64,7 +66,8 @@ class PoseRefinement {
   double extent_;
   std::vector<double> distances_;
   double prior_;
-  // Tell what motion all have in common: the distance of stray cameras would outweigh it.
+  std::vector<std::size_t> trained_;
+  // Tell what motion these have in common: the distance of stray cameras would outweigh it.
   std::vector<std::size_t> usual_;
   State state_;
 };

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <set>
 #include <utility>
 
 #include "util/rng.hpp"
@@ -18,6 +19,7 @@ constexpr std::uint64_t kBackgroundStream = 0x6261636b;
 constexpr std::uint64_t kJoinedPass = std::uint64_t{1} << 48;  // of passes over all views
 constexpr double kValidationShare = 0.9;  // of the run; then validation views are trained on too
 constexpr int kValidations = 9;
+constexpr std::int64_t kNeverJoined = 1LL << 52;  // beyond any run; its views can be counted
 constexpr double kTimedShare = 0.05;  // of a run, once its steps are alike, that is timed
 
 // Flat Gaussians: they find their shortest axis while they are round, and lose it from one share of
@@ -43,6 +45,12 @@ constexpr FittedRate kShRestRate{0.003, 0.0005, 0.003};
 constexpr FittedRate kShRestFinalRate{0.001, 0.000125, 0.001};
 
 constexpr double kUsualColorRange = 0.8;  // below, photos lack contrast
+
+// Completed iterations at which validation views are looked at, the first to the kValidations-th.
+std::int64_t validation_at(const TrainOptions& options, int number) {
+  const double share = kValidationShare * number / kValidations;
+  return std::llround(share * static_cast<double>(options.iterations));
+}
 
 // By the root of the number of steps, as far as a walk of that many steps leads.
 double fitted(const FittedRate& rate, const TrainOptions& options) {
@@ -168,8 +176,8 @@ std::int64_t last_iteration(const TrainOptions& options) {
 
 std::int64_t steady_from(const TrainOptions& options) {
   std::int64_t from =
-      std::max(options.densify_until.of(options.iterations),
-               options.sh_degree * options.sh_degree_interval.of(options.iterations));
+      std::max({std::int64_t{1}, options.densify_until.of(options.iterations),
+                options.sh_degree * options.sh_degree_interval.of(options.iterations)});
   for (const ResolutionStep& step : options.resolution_schedule)
     from = std::max(from, step.until.of(options.iterations));
   if (options.flat) from = std::max(from, RunShare(kFlatUntil).of(options.iterations));
@@ -201,13 +209,38 @@ std::int64_t validation_end(const TrainOptions& options) {
   return std::llround(kValidationShare * static_cast<double>(options.iterations));
 }
 
+std::int64_t validation_join(const TrainOptions& options) {
+  return options.poses ? kNeverJoined : validation_end(options);
+}
+
 bool validates_at(const TrainOptions& options, std::int64_t iteration) {
   if (options.validate_views == 0 || iteration > validation_end(options)) return false;
-  for (int tenth = 1; tenth <= kValidations; ++tenth) {
-    const double share = kValidationShare * tenth / kValidations;
-    if (std::llround(share * static_cast<double>(options.iterations)) == iteration) return true;
+  for (int number = 1; number <= kValidations; ++number) {
+    if (validation_at(options, number) == iteration) return true;
   }
   return false;
+}
+
+std::size_t evaluation_count(const TrainOptions& options) {
+  const std::int64_t last = last_iteration(options);
+  std::set<std::int64_t> single;
+  for (const RunShare& share : options.eval_at) {
+    const std::int64_t at = share.of(options.iterations);
+    if (at > 0 && at < last) single.insert(at);
+  }
+  if (options.eval_every == 0 || last == 0) return single.size() + 1;
+  std::erase_if(single, [&](std::int64_t at) { return at % options.eval_every == 0; });
+  return single.size() + static_cast<std::size_t>((last - 1) / options.eval_every) + 1;
+}
+
+std::size_t validation_count(const TrainOptions& options) {
+  if (options.validate_views == 0) return 0;
+  std::set<std::int64_t> all;
+  for (int number = 1; number <= kValidations; ++number) {
+    const std::int64_t at = validation_at(options, number);
+    if (at > 0 && at <= last_iteration(options)) all.insert(at);
+  }
+  return all.size();
 }
 
 std::vector<std::size_t> validation_views(std::size_t views, int count) {

@@ -72,8 +72,8 @@ int resolution_divisor(const TrainOptions& options, std::int64_t iteration);
 /// Iteration that the run ends with.
 std::int64_t last_iteration(const TrainOptions& options);
 
-/// The iteration from which on steps are alike: photos have their full size, all SH bands are on,
-/// density control is over, and flat Gaussians are flat.
+/// The iteration, 1 at least, from which on steps are alike: photos have their full size, all SH
+/// bands are on, the number of Gaussians no longer grows, and flat ones are flat.
 std::int64_t steady_from(const TrainOptions& options);
 
 /// Until when a run by time takes the time of such steps, which then tells when it will end.
@@ -91,12 +91,23 @@ std::array<float, 3> step_background(const TrainOptions& options,
                                      const std::array<float, 3>& constant,
                                      std::int64_t iteration);
 
-/// Completed iterations after which the views of validate-views join the others: 0.9 of the run.
+/// Completed iterations after which the views of validate-views judge no more: 0.9 of the run.
 std::int64_t validation_end(const TrainOptions& options);
+
+/// Completed iterations after which these views join the others: validation_end(). Where poses are
+/// trained a number that no run reaches: theirs would join untrained, when those of the others are
+/// known, and harm the model.
+std::int64_t validation_join(const TrainOptions& options);
 
 /// Whether the validation views are looked at after `iteration` completed ones: every tenth of the
 /// run, as long as they are kept apart.
 bool validates_at(const TrainOptions& options, std::int64_t iteration);
+
+/// Iterations of the run after which the test views are evaluated, the last one among them.
+std::size_t evaluation_count(const TrainOptions& options);
+
+/// Iterations of the run after which the validation views are looked at.
+std::size_t validation_count(const TrainOptions& options);
 
 /// Training views that validation leaves.
 constexpr std::size_t kLeastTrained = 2;

@@ -112,7 +112,7 @@ Trainer::Impl::Impl(Context& device,
   apply_options();
   if (options.strategy == DensityStrategy::kMcmc)
     mcmc.emplace(device, options, subject_length(train_cameras, dataset.points, extent));
-  if (options.exposure) exposure.emplace(device, train_views.size(), slots.size());
+  reset_exposure();
   reset_sky();
   reset_poses();
   check_views_and_options();
@@ -185,13 +185,15 @@ void Trainer::resume(const std::filesystem::path& source) {
 
 TrainSummary Trainer::run(bool show_progress) { return impl_->train(show_progress); }
 
-RunEstimate Trainer::estimate(double seconds) {
+RunEstimate Trainer::estimate(double seconds, bool show_progress) {
   const auto turn = impl_->context.lock();
+  impl_->shows_progress = show_progress;
   return impl_->estimate(seconds);
 }
 
-RunEstimate Trainer::fit_time(double seconds) {
+RunEstimate Trainer::fit_time(double seconds, bool show_progress) {
   const auto turn = impl_->context.lock();
+  impl_->shows_progress = show_progress;
   return impl_->fit_time(seconds);
 }
 

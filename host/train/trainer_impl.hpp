@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <cstdio>
 #include <deque>
 #include <filesystem>
 #include <functional>
@@ -77,6 +78,12 @@ struct RunClock {
   double row_seconds = 0;                     ///< of training, then
 };
 
+/// How views are measured.
+struct MeasureWatch {
+  std::FILE* terminal = nullptr;        ///< on which a bar shows how far it is
+  std::function<bool()> stopping = {};  ///< asked picture by picture whether to break it off
+};
+
 /// What a run is asked to do between two steps.
 struct Asked {
   std::atomic<bool> stop = false;
@@ -119,6 +126,7 @@ struct Trainer::Impl {
   void check_room(std::size_t count, std::size_t most) const;
   void choose_background();
   void choose_color_range();
+  void reset_exposure();
   void reset_sky();
   void reset_poses();
   std::int64_t turn_of(std::size_t slot) const;
@@ -154,6 +162,7 @@ struct Trainer::Impl {
   Pilot run_pilot(double seconds, std::optional<double> run_time);
   void time_steps(double seconds, std::optional<double> run, Pilot& pilot);
   void undo_pilot();
+  RunEstimate with_evaluations(RunEstimate training) const;
   RunEstimate estimate(double seconds);
   RunEstimate fit_time(double seconds);
   bool fit_end_to_time();
@@ -165,7 +174,7 @@ struct Trainer::Impl {
   void restore_joined_views(const Checkpoint& checkpoint);
   bool validation_due() const;
   bool is_validated() const;
-  void validate_views();
+  bool validate_views(const MeasureWatch& watch);
   bool out_of_patience() const;
   void keep_best_model();
 
@@ -184,11 +193,12 @@ struct Trainer::Impl {
 
   // trainer_report.cpp: what a run says of itself.
   void report(Progress& progress);
-  void evaluate_views(bool last);
+  bool evaluate_views(bool last, const MeasureWatch& watch = {});
   bool is_evaluated(bool last) const;
-  EvaluationRow measure(const Dataset& views,
-                        const std::filesystem::path& folder,
-                        EvaluationOptions choice);
+  std::optional<EvaluationRow> measure(const Dataset& views,
+                                       const std::filesystem::path& folder,
+                                       EvaluationOptions choice,
+                                       const MeasureWatch& watch);
   void set_background();
   TraceOptions trace_options();                  // that the model looks right with
   const DeviceGaussians& model_to_show() const;  // the mean of the last steps, if they have begun
@@ -227,6 +237,7 @@ struct Trainer::Impl {
   bool run_iteration(const Loop& loop);
   bool finish_iteration(const Loop& loop, bool stop, bool anew);
   void untimed(const Loop& loop, const std::function<void()>& work);
+  MeasureWatch watch_of(const Loop& loop) const;
   void let_watcher_look(const std::function<bool()>& interrupted);
 
   Context& context;
@@ -276,15 +287,18 @@ struct Trainer::Impl {
   std::int64_t iteration = 0;                                   // completed
   std::map<std::size_t, std::vector<SmallPhoto>> small_photos;  // so many, once asked for
   std::optional<Gaussians> first_model;                         // made before start()
+  bool shows_progress = false;                                  // of what precedes the first step
   bool started = false;
-  bool ended = false;  // before its time, by patience
+  bool ended = false;    // before its time, by patience
+  bool cut_off = false;  // with the evaluation of its newest iteration still to be made
   bool whole = false;  // the device holds the state after `iteration` iterations, nothing half done
   bool pass_due = false;    // of density control, after the newest step
   std::int64_t saved = -1;  // iteration of the newest checkpoint of this run
   std::uint32_t reported_bad_steps = 0;
-  std::uint64_t traced_rays = 0;  // of all training views of the run
-  std::deque<SentStep> sent;      // the oldest first
-  bool await_sizes = false;       // of the next step: its view had too little room
+  std::uint64_t traced_rays = 0;     // of all training views of the run, reflected ones with them
+  std::uint64_t reflected_rays = 0;  // by mirrors, in the views of the step
+  std::deque<SentStep> sent;         // the oldest first
+  bool await_sizes = false;          // of the next step: its view had too little room
   bool cap_reported = false;
   std::int64_t timed_steps = 0;                  // whose kernels were timed
   std::uint64_t skipped_before = 0;              // updates of Adam, before resume()

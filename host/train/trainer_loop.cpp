@@ -64,11 +64,17 @@ void Trainer::Impl::untimed(const Loop& loop, const std::function<void()>& work)
   clock.training.start();
 }
 
+// For evaluations and validations, which take long: what would end the run after a step breaks them
+// off.
+MeasureWatch Trainer::Impl::watch_of(const Loop& loop) const {
+  return {loop.progress.terminal(), [this, &loop] { return asked.stop || loop.interrupted(); }};
+}
+
 // Up to `until` completed iterations. The first thing is what the newest one lacks because an error
 // or a signal came in between, or because it was made into another folder; not what would have
 // been measured of a model that density control has changed since.
 void Trainer::Impl::run_iterations(std::int64_t until, const Loop& loop) {
-  bool stop = false;
+  bool stop = cut_off = false;
   {
     const auto turn = context.lock();
     const bool over = iteration == last_iteration(options) ||
@@ -111,15 +117,18 @@ bool Trainer::Impl::saves_model(std::int64_t at) const {
 
 // What follows a step: evaluations and files, before density control, as in 3DGS, because fresh
 // clones and children have not settled yet; then that, and the checkpoint. An interrupted run
-// leaves evaluations and density control to the one that goes on. Unless the iteration is `anew`,
-// files that are there stay. Returns whether the run ends with it, as it does with `stop`. What is
-// done together rank 0 decides: others may have a folder of their own, which says less.
+// leaves evaluations, one that is broken off too, and density control to the one that goes on.
+// Unless the iteration is `anew`, files that are there stay. Returns whether the run ends with it,
+// as it does with `stop`. What is done together rank 0 decides: others may have a folder of their
+// own, which says less.
 bool Trainer::Impl::finish_iteration(const Loop& loop, bool stop, bool anew) {
   const bool last = iteration == last_iteration(options);
   bool ends = false;
   if (loop.scheduled && iteration > 0 && validation_due()) {
-    if (!ranks.broadcast_value(0, is_validated())) untimed(loop, [this] { validate_views(); });
-    ends = ranks.broadcast_value(0, out_of_patience());
+    if (!ranks.broadcast_value(0, is_validated()))
+      untimed(loop, [&] { cut_off = !validate_views(watch_of(loop)); });
+    ends = !cut_off && ranks.broadcast_value(0, out_of_patience());
+    stop = stop || cut_off;
   }
   if (ends) {
     stop = ended = true;
@@ -128,21 +137,23 @@ bool Trainer::Impl::finish_iteration(const Loop& loop, bool stop, bool anew) {
         "and --resume goes on with a larger --patience alone",
         iteration, options.patience);
   }
-  const bool evaluates = ends || last ||
-                         (!stop && (every(options.eval_every, iteration) ||
-                                    contains(options.eval_at, options.iterations, iteration)));
-  const bool saves =
-      loop.scheduled && (stop || saves_model(iteration)) && (anew || !run.has_model(iteration));
+  const bool evaluates =
+      !cut_off && (ends || last ||
+                   (!stop && (every(options.eval_every, iteration) ||
+                              contains(options.eval_at, options.iterations, iteration))));
+  const bool lacks_model = loop.scheduled && (anew || !run.has_model(iteration));
+  const bool saves = lacks_model && (stop || saves_model(iteration));
   if (saves) untimed(loop, [this] { save_model(); });
   if (loop.scheduled && evaluates && !ranks.broadcast_value(0, is_evaluated(last || ends)))
-    untimed(loop, [this, last, ends] { evaluate_views(last || ends); });
+    untimed(loop, [&] { cut_off = !evaluate_views(last || ends, watch_of(loop)); });
+  stop = stop || cut_off;
   if (last) {
     pass_due = false;
-  } else if (ends || !stop) {
+  } else if (!cut_off && (ends || !stop)) {
     control_density();
   }
   const bool save_now = asked.save.exchange(false);
-  if (save_now && !saves) untimed(loop, [this] { save_model(); });
+  if (!saves && (save_now || (cut_off && lacks_model))) untimed(loop, [this] { save_model(); });
   const bool keeps = loop.scheduled &&
                      (stop || last || every(options.checkpoint_every, iteration)) &&
                      (anew || !is_file(checkpoint_path(run.path(), iteration)));
@@ -201,6 +212,7 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   const InterruptGuard interrupt(LostReader::kInterrupts);
   {
     const auto turn = context.lock();
+    shows_progress = show_progress;
     make_first_model();
   }
   const FolderUse folder(*this);
@@ -210,9 +222,10 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   }
   run_and_rescue(kWholeRun, true, show_progress, [&] { return interrupt.requested(); });
   ranks.barrier();  // what rank 0 writes is written
-  keep_best_model();
-  const bool complete = iteration == last_iteration(options);
-  write_metrics(ended || complete);
+  const bool complete = iteration == last_iteration(options) && !cut_off;
+  const bool over = complete || (ended && !cut_off);
+  if (over) keep_best_model();
+  write_metrics(over);
   if (const std::uint64_t capped = guard.counts().capped_rays; capped > 0)
     warn_of_capped_rays(capped);
   if (complete) warn_of_no_progress();
@@ -223,7 +236,7 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
         judged_psnr(run.evaluations().back(), options.exposure), best->iteration,
         judged_psnr(*best, options.exposure));
   }
-  if (!complete && !asked.stop && !ended) {
+  if (!over && !asked.stop) {
     throw Error(
         ErrorCode::kInterrupted,
         fmt::format("Interrupted at iteration {}; everything is saved: continue with --resume {}",

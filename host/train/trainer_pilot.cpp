@@ -73,6 +73,7 @@ struct Trainer::Impl::Pilot {
   double seconds = 0;        // all of it
   double opaque_share = 1;   // of the photos' pixels
   std::size_t first = 0;     // Gaussians of the start
+  std::size_t most = 0;      // that it may have had
 };
 
 void Trainer::Impl::check_not_begun(const char* function) const {
@@ -212,7 +213,7 @@ void Trainer::Impl::undo_pilot() {
   guard.restore({});
   mean.restart(0);
   fit.forget();
-  if (exposure) exposure.emplace(context, train_views.size(), slots.size());
+  reset_exposure();
   reset_sky();
   reset_poses();
   iteration = 0;
@@ -238,6 +239,7 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   const Timer timer(context);
   Pilot pilot;
   const std::size_t most = limit();
+  pilot.most = most;
   check_room(0, most);
   // While the start is made: those of the steps that are timed.
   begin_programs({active_sh_degree(options, 0), active_sh_degree(options, options.iterations / 2)});
@@ -262,6 +264,23 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   return pilot;
 }
 
+RunEstimate Trainer::Impl::with_evaluations(RunEstimate training) const {
+  if (!test_views.empty()) {
+    const std::size_t some =
+        options.eval_views > 0
+            ? std::min(test_views.size(), static_cast<std::size_t>(options.eval_views))
+            : test_views.size();
+    training.evaluations = evaluation_count(options);
+    training.evaluated_views = (training.evaluations - 1) * some + test_views.size();
+  }
+  if (!apart.empty()) {
+    const std::size_t validations = validation_count(options);
+    training.evaluations += validations;
+    training.evaluated_views += validations * apart.size();
+  }
+  return training;
+}
+
 RunEstimate Trainer::Impl::estimate(double seconds) {
   check_not_begun("estimate");
   require_end(seconds);
@@ -270,9 +289,12 @@ RunEstimate Trainer::Impl::estimate(double seconds) {
   const bool grows = density.accumulates_at(0);
   const double planned = predicted_seconds(pilot, options.iterations, grows ? most : pilot.first);
   const std::int64_t end = last_iteration(options);
-  return {end, grows ? most : pilot.first,
-          planned * static_cast<double>(end) /
-              static_cast<double>(std::max<std::int64_t>(options.iterations, 1))};
+  RunEstimate out;
+  out.iterations = end;
+  out.gaussians = grows ? most : pilot.first;
+  out.seconds = planned * static_cast<double>(end) /
+                static_cast<double>(std::max<std::int64_t>(options.iterations, 1));
+  return with_evaluations(out);
 }
 
 RunEstimate Trainer::Impl::fit_time(double seconds) {
@@ -301,13 +323,16 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
     options.iterations = iterations_within(left, kLeastIterations, duration);
   }
   options.max_gaussians = static_cast<std::int64_t>(most_gaussians(options.iterations));
-  first_model.reset();  // it was made for another limit
+  if (limit() != pilot.most) first_model.reset();
   apply_options();
   options.end_iteration = 0;
   clock.training.set(pilot.seconds);
   clock.run_seconds = seconds;
-  return {options.iterations, static_cast<std::size_t>(options.max_gaussians),
-          pilot.seconds + duration(options.iterations)};
+  RunEstimate out;
+  out.iterations = options.iterations;
+  out.gaussians = static_cast<std::size_t>(options.max_gaussians);
+  out.seconds = pilot.seconds + duration(options.iterations);
+  return with_evaluations(out);
 }
 
 // Keeps a run by time to its time: its last steps are alike, and once a part of them is timed the

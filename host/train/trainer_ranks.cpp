@@ -20,6 +20,7 @@ namespace {
 // What a rank says of its views in a step.
 struct StepWord {
   std::uint64_t capped_rays;
+  std::uint64_t reflected_rays;
   std::uint32_t mark;  // StepGuard::marked()
   std::uint32_t stop;  // whether it has been told to end the run
 };
@@ -63,11 +64,12 @@ bool Trainer::Impl::sum_views() {
   if (ranks.size() > 1) {
     sum.wait();
     const std::vector<std::uint32_t> capped = guard.step_capped().download();
-    StepWord sum_of_all{0, 0, 0};
+    StepWord sum_of_all{0, 0, 0, 0};
     for (const StepWord& word :
-         ranks.all_gather(StepWord{std::uint64_t{capped[1]} << 32 | capped[0], guard.marked(),
-                                   asked.stop_wished ? 1u : 0u})) {
+         ranks.all_gather(StepWord{std::uint64_t{capped[1]} << 32 | capped[0], reflected_rays,
+                                   guard.marked(), asked.stop_wished ? 1u : 0u})) {
       sum_of_all.capped_rays += word.capped_rays;
+      sum_of_all.reflected_rays += word.reflected_rays;
       sum_of_all.mark |= word.mark;
       sum_of_all.stop |= word.stop;
     }
@@ -79,6 +81,7 @@ bool Trainer::Impl::sum_views() {
       return false;
     }
     guard.set_step_capped(sum_of_all.capped_rays);
+    reflected_rays = sum_of_all.reflected_rays;
     asked.stop_agreed = sum_of_all.stop != 0;
     exchange_slots();
   }

@@ -104,20 +104,41 @@ void Trainer::Impl::warn_of_no_progress() const {
 }
 
 // Measures the model by the views of a data set that are held out, of which each rank traces a
-// share. Pictures go to `folder`.
-EvaluationRow Trainer::Impl::measure(const Dataset& views,
-                                     const std::filesystem::path& folder,
-                                     EvaluationOptions choice) {
+// share. Pictures go to `folder`. Nothing, on all ranks, where any of them has broken it off.
+std::optional<EvaluationRow> Trainer::Impl::measure(const Dataset& views,
+                                                    const std::filesystem::path& folder,
+                                                    EvaluationOptions choice,
+                                                    const MeasureWatch& watch) {
+  std::size_t count = views.indices(Split::kTest).size();
+  if (choice.max_views > 0) count = std::min(count, choice.max_views);
+  // As many as the rank that shows it has of them.
+  const std::size_t shown =
+      (count + static_cast<std::size_t>(ranks.size()) - 1) / static_cast<std::size_t>(ranks.size());
+  Progress progress("Evaluating", static_cast<std::int64_t>(shown), 0, watch.terminal);
+  std::int64_t finished = 0;
+  bool stopped = false;
+  const auto goes_on = [&] {
+    progress.update(finished, "");
+    stopped = stopped || (watch.stopping && watch.stopping());
+    return !stopped;
+  };
   set_background();
   DeviceGaussians room;
   const DeviceGaussians& model = model_to_measure(room);
   const auto render = [&](const Camera& camera) {
+    if (!goes_on()) return Image();
     tracer.forward(model, camera);
     return tracer.download_image();
   };
   choice.ranks = &ranks;
+  choice.done = [&](std::size_t done) {
+    finished = static_cast<std::int64_t>(done);
+    return goes_on();
+  };
   const EvaluationReport report =
       raysplats::evaluate(render, views, Split::kTest, background, folder, choice);
+  progress.suspend();
+  if (ranks.all_reduce_or(stopped)) return std::nullopt;
   EvaluationRow row;
   row.iteration = iteration;
   row.training_seconds = clock.training.seconds();
@@ -131,26 +152,35 @@ EvaluationRow Trainer::Impl::measure(const Dataset& views,
   return row;
 }
 
-// Measures the test views; the time counts as evaluation, not as training.
-void Trainer::Impl::evaluate_views(bool last) {
-  if (test_views.empty()) return;
+// Measures the test views; the time counts as evaluation, not as training. Returns whether it was
+// done to its end: what was broken off leaves nothing.
+bool Trainer::Impl::evaluate_views(bool last, const MeasureWatch& watch) {
+  if (test_views.empty()) return true;
   clock.evaluating.start();
   EvaluationOptions choice;
   choice.max_views = last ? 0 : static_cast<std::size_t>(options.eval_views);
   choice.max_pictures = static_cast<std::size_t>(options.eval_renders);
   choice.align = last && options.poses;
   choice.photo = [this](std::size_t view) { return evaluated_photo(view); };
-  const EvaluationRow row = measure(dataset, run.evaluation_folder(iteration), choice);
-  run.record(row);
+  const std::optional<EvaluationRow> row =
+      measure(dataset, run.evaluation_folder(iteration), choice, watch);
+  if (!row) {
+    run.remove_evaluation(iteration);
+    clock.evaluating.stop();
+    return false;
+  }
+  run.record(*row);
   if (watcher) watcher->evaluated(run.evaluations().back());
   write_metrics(false);
   clock.evaluating.stop();
   spdlog::info("iteration {}: PSNR {:.2f} dB, SSIM {:.4f} over {} test views after {} of training",
-               iteration, row.psnr, row.ssim, row.views, format_duration(clock.training.seconds()));
-  if (row.psnr_aligned) {
+               iteration, row->psnr, row->ssim, row->views,
+               format_duration(clock.training.seconds()));
+  if (row->psnr_aligned) {
     spdlog::info("with cameras moved to where they fit the photos best, PSNR is {:.2f} dB",
-                 *row.psnr_aligned);
+                 *row->psnr_aligned);
   }
+  return true;
 }
 
 // Whether this iteration has been evaluated; with `last` as the end of a run is, with all views and

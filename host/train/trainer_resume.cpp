@@ -4,15 +4,27 @@
 
 #include <cmath>
 #include <optional>
+#include <string>
 #include <system_error>
 #include <utility>
 
+#include "run/dataset_fingerprint.hpp"
 #include "run/train_config.hpp"
 #include "train/run_state.hpp"
 #include "train/trainer_impl.hpp"
 #include "util/file_kind.hpp"
 
 namespace raysplats {
+namespace {
+
+// Of the data as a run of that configuration takes them: with depth maps where it trains on depths.
+// The weight of depths may change, as others do.
+std::string fingerprint_for(const std::string& config, const Dataset& dataset) {
+  return dataset_fingerprint(dataset,
+                             !config.empty() && parse_train_config(config).depth_weight > 0);
+}
+
+}  // namespace
 
 // The state between two steps, or with density control still to come.
 void Trainer::Impl::write_state(const std::filesystem::path& path) {
@@ -166,7 +178,8 @@ void Trainer::Impl::check_fits(const Checkpoint& checkpoint) const {
         "The checkpoint was made with seed {}, not {}: resume with the configuration of the run",
         checkpoint.seed, options.seed));
   }
-  if (!checkpoint.dataset.empty() && checkpoint.dataset != fingerprint) {
+  if (!checkpoint.dataset.empty() && checkpoint.dataset != fingerprint &&
+      checkpoint.dataset != fingerprint_for(checkpoint.config, dataset)) {
     throw UsageError(
         fmt::format("The checkpoint of iteration {} was made with other data than {}: resume with "
                     "the photos and cameras of the run, or start a new one with --init",

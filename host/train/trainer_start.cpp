@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cstdio>
 
 #include "io/dataset_views.hpp"
 #include "run/former_metrics.hpp"
@@ -137,7 +138,8 @@ const std::vector<SmallPhoto>& Trainer::Impl::photos(PhotoChoice choice) {
 }
 
 std::vector<SmallPhoto> Trainer::Impl::reduced_photos(std::span<const std::size_t> views) const {
-  std::vector<SmallPhoto> out = load_small_photos(dataset, views, kSmallPhoto);
+  std::vector<SmallPhoto> out =
+      load_small_photos(dataset, views, kSmallPhoto, {shows_progress ? stderr : nullptr});
   if (exposure) balance(out);
   return out;
 }
@@ -149,6 +151,11 @@ std::vector<std::size_t> Trainer::Impl::first_views() const {
     if (!std::binary_search(apart.begin(), apart.end(), i)) out.push_back(train_views[i]);
   }
   return out;
+}
+
+// Colours of photos that nothing has been learned of, where they are found.
+void Trainer::Impl::reset_exposure() {
+  if (options.exposure) exposure.emplace(context, train_views.size(), slots.size(), cut_out, apart);
 }
 
 // A sky that nothing has been learned of.
@@ -163,7 +170,7 @@ void Trainer::Impl::reset_sky() {
 void Trainer::Impl::reset_poses() {
   if (!options.poses) return;
   poses.emplace(train_cameras, extent, subject_distances(train_cameras, dataset.points, extent),
-                kPosePrior);
+                kPosePrior, apart);
 }
 
 // What shows through where no Gaussian is. No photo says what lies there, and of all colours the

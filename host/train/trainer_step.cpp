@@ -37,16 +37,17 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
   if (!sky) tracer.set_background(behind);
   tracer.forward(gaussians, camera, true,
                  await_sizes || trains_poses ? ViewSizes::kAwaited : ViewSizes::kAhead);
+  reflected_rays += tracer.reflected_rays();
   const Buffer<float>& shown =
-      exposure ? exposure->apply(tracer.image(), view, camera.width, camera.height)
+      exposure ? exposure->apply(tracer.image(), view, behind, camera.width, camera.height)
                : tracer.image();
   const DevicePhoto photo = photo_cache.get(view, camera.width, camera.height);
   loss.evaluate(shown, photo, cut_out, behind, camera.width, camera.height, image_gradient);
   guard.check_loss(loss.partials(), tracer.overflow());
   fit.note(view, divisor == 1, loss.partials(), tracer.overflow());
   if (exposure) {
-    exposure->observe(tracer.image(), photo, cut_out, behind, camera.width, camera.height, slot);
-    exposure->backward(image_gradient, view, camera.width, camera.height);
+    exposure->observe(tracer.image(), photo, behind, camera.width, camera.height, slot);
+    exposure->backward(image_gradient, view, behind, camera.width, camera.height);
   }
   if (depths) {
     depths->backward({view, camera.width, camera.height}, tracer.image(), tracer.depth(), photo,
@@ -68,6 +69,7 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
 // The views of a step, those of this rank with their gradients.
 void Trainer::Impl::enqueue_views() {
   sum.begin(ranks, slots.size());
+  reflected_rays = 0;
   for (std::size_t slot = 0; slot < slots.size(); ++slot) {
     slots[slot].view = order.at(turn_of(slot));
     if (share.holds(slot)) enqueue_view(slot);
@@ -83,11 +85,15 @@ void Trainer::Impl::enqueue_step() {
   const int divisor = resolution_divisor(options, iteration);
   const bool several = slots.size() > 1;
   whole = false;
+  traced_rays += reflected_rays;
   for (std::size_t slot = 0; slot < slots.size(); ++slot) {
     const ViewSlot& one = slots[slot];
     const Camera& full = train_cameras[one.view];
     traced_rays += pixel_count(divisor > 1 ? downscaled(full, divisor) : full);
-    if (exposure) exposure->step(one.view, slot, options.exposure_damping, guard.mark());
+    if (exposure) {
+      exposure->step(one.view, slot, options.exposure_damping, guard.mark(),
+                     iteration >= join_iteration());
+    }
     if (poses && iteration < pose_end(options))
       poses->step(one.view, one.pose_gradient, learning_rate(options.pose_lr, options, iteration));
   }

@@ -2,6 +2,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "raysplats/evaluation.hpp"
 #include "run/train_config.hpp"
@@ -30,7 +31,7 @@ bool is_scheduled(const TrainOptions& options, std::int64_t iteration) {
 
 // The last one before the validation views are trained on too.
 std::int64_t Trainer::Impl::join_iteration() const {
-  return joined.value_or(validation_end(options));
+  return joined.value_or(validation_join(options));
 }
 
 // Those that steps are passes over. The views that join at the end of a run as it was planned come
@@ -46,9 +47,9 @@ void Trainer::Impl::restore_joined_views(const Checkpoint& checkpoint) {
   if (apart.empty()) return;
   const std::int64_t planned = checkpoint.views_joined > 0 || checkpoint.config.empty()
                                    ? checkpoint.views_joined
-                                   : validation_end(parse_train_config(checkpoint.config));
+                                   : validation_join(parse_train_config(checkpoint.config));
   const bool trained_on = planned > 0 && checkpoint.iteration > planned;
-  if (trained_on && planned < validation_end(options)) {
+  if (trained_on && planned < validation_join(options)) {
     joined = planned;
     spdlog::warn(
         "the run was to be shorter, and its {} validation views have been trained on since "
@@ -71,8 +72,9 @@ bool Trainer::Impl::is_validated() const {
 
 // Traces the validation views at full size. The model is kept while it is the best so far. Nothing
 // told exposure and pose of photos that were not trained on, so neither counts where it is found
-// for the others: the better a model, the more an error of a pose would cost it.
-void Trainer::Impl::validate_views() {
+// for the others: the better a model, the more an error of a pose would cost it. Returns whether it
+// was done to its end: what was broken off leaves nothing.
+bool Trainer::Impl::validate_views(const MeasureWatch& watch) {
   clock.evaluating.start();
   Dataset validation = dataset;
   validation.views.clear();
@@ -84,7 +86,12 @@ void Trainer::Impl::validate_views() {
   choice.align = options.poses;
   choice.align_colors = exposure.has_value();
   choice.photo = [this](std::size_t i) { return evaluated_photo(train_views[apart[i]]); };
-  EvaluationRow row = measure(validation, {}, choice);
+  const std::optional<EvaluationRow> measured = measure(validation, {}, choice, watch);
+  if (!measured) {
+    clock.evaluating.stop();
+    return false;
+  }
+  EvaluationRow row = *measured;
   row.psnr = row.psnr_aligned.value_or(exposure ? row.psnr_corrected : row.psnr);
   const std::vector<EvaluationRow>& rows = run.validations();
   std::int64_t former = 0;
@@ -99,6 +106,7 @@ void Trainer::Impl::validate_views() {
   spdlog::info("iteration {}: PSNR {:.2f} dB over {} validation views{}{}", iteration, row.psnr,
                row.views, options.poses ? ", each from where it fits its photo" : "",
                exposure ? ", in its photo's colours" : "");
+  return true;
 }
 
 bool Trainer::Impl::out_of_patience() const {

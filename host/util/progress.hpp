@@ -39,6 +39,9 @@ class Progress {
   void suspend();
   void resume();
 
+  /// The stream where it is a terminal, for a bar that takes this one's place while it is
+  /// suspended; else null.
+  std::FILE* terminal() const { return terminal_ ? stream_ : nullptr; }
   /// Steps per second over the recent past.
   double rate() const { return rate_; }
   /// The line as it would be drawn in `width` columns.

@@ -87,7 +87,7 @@ struct TrainOptions {
 
   // Data
   DatasetOptions data;     ///< how the data set was read; a resumed run has to have the same
-  int validate_views = 0;  ///< training views kept out of the loss until 0.9 of the run
+  int validate_views = 0;  ///< training views kept out of the loss, by which the run is judged
   int patience = 0;        ///< validations in a row without gain that end the run; 0 = off
   /// "auto" (white behind cut-out photos, else the photos' typical colour), "random", "sky" or
   /// "r,g,b".

@@ -38,6 +38,9 @@ struct RunEstimate {
   std::int64_t iterations = 0;  ///< of the whole run
   std::size_t gaussians = 0;    ///< at its end, if densification reaches its limit
   double seconds = 0;           ///< of training, as TrainSummary::training_seconds
+  /// Evaluations and validations that run() makes beside training, and the views of all of them.
+  std::size_t evaluations = 0;
+  std::size_t evaluated_views = 0;
 };
 
 /// Where a run is after a step.
@@ -90,19 +93,21 @@ class Trainer {
 
   /// How long the run will take. Times steps of a small run of the same shape for about `seconds`
   /// (less when the estimate is that short; a start and some photos come on top) and puts
-  /// everything back: the run is as without. Throws UsageError once training has begun.
-  RunEstimate estimate(double seconds);
+  /// everything back: the run is as without. With `show_progress` stderr tells how far reading many
+  /// photos is. Throws UsageError once training has begun.
+  RunEstimate estimate(double seconds, bool show_progress = false);
   /// Sets options.iterations, and max_gaussians where that is 0, so that measuring (a twentieth of
   /// it, at most ten minutes) and training take `seconds`; RUN/config.toml names both. When the
   /// run's last steps have begun, some are timed and options.end_iteration is set to where the time
-  /// will be over, there too. Throws UsageError once training has begun, and for a time in which
-  /// nothing can be trained or that is beyond 1e9 s.
-  RunEstimate fit_time(double seconds);
+  /// will be over, there too. `show_progress` is as in estimate(). Throws UsageError once training
+  /// has begun, and for a time in which nothing can be trained or that is beyond 1e9 s.
+  RunEstimate fit_time(double seconds, bool show_progress = false);
 
   /// Trains up to options.iterations, or end_iteration. SIGINT, SIGTERM, SIGHUP and, where it would
-  /// end the process, SIGPIPE finish the iteration, save a checkpoint and the model and throw
-  /// Error(kInterrupted). Ten steps in a row that are not finite (StepGuard) leave RUN/dump and
-  /// throw Error(kRuntime) naming the iteration.
+  /// end the process, SIGPIPE finish the iteration, break off an evaluation, which the
+  /// run that goes on makes up for, save a checkpoint and the model and throw Error(kInterrupted).
+  /// Ten steps in a row that are not finite (StepGuard) leave RUN/dump and throw Error(kRuntime)
+  /// naming the iteration.
   /// After other failures, and after an exception from a callback, the last whole state is saved
   /// when the device still gives it, and the error says which iteration that is; what a callback
   /// throws comes out as it is. Throws DataError when another run has the folder.
@@ -119,8 +124,9 @@ class Trainer {
   /// stop(). Throws UsageError for a callback while run() or step() is under way, which keeps its
   /// own.
   void on_step(std::function<void(const TrainProgress&)> callback);
-  /// Ends run() or step() after the iteration that is under way. run() then saves as it does for a
-  /// signal, and returns: its summary has fewer iterations than the options.
+  /// Ends run() or step() after the iteration that is under way, without an evaluation that the
+  /// schedule may have after it. run() then saves as it does for a signal, and returns: its summary
+  /// has fewer iterations than the options.
   void stop();
 
   /// Traces the test views, writes RUN/eval and RUN/metrics.json. Throws UsageError when the data

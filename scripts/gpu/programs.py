@@ -116,6 +116,7 @@ PROGRAMS = [
     ("gradient tree", "train/gradient_tree.cl", {}),
     ("view sizes", "trace/view_sizes.cl", {}),
     ("exposure", "train/exposure.cl", {}),
+    ("exposure cut-outs", "train/exposure.cl", dict(CUT_OUT=1)),
     ("depth loss", "train/depth_supervision.cl", {}),
     ("sky step", "train/sky_adam.cl", {}),
     ("validate", "train/model_validator.cl", {}),

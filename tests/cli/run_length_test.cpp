@@ -29,11 +29,12 @@ std::string value_of(const std::string& run, const std::string& key) {
 TEST_CASE("the length of a run follows from a time or a quality, and is said beforehand") {
   const TemporaryFolder folder;
   const std::string data = folder / "data", timed = folder / "timed", look = folder / "look";
-  succeed({"generate", data, "--size", "48", "--train-views", "5", "--test-views", "1", "-q"});
+  succeed({"generate", data, "--size", "48", "--train-views", "5", "--test-views", "2", "-q"});
 
-  const Outcome outcome = succeed({"train", data, "-o", timed, "--time", "4s"});
+  const Outcome outcome =
+      succeed({"train", data, "-o", timed, "--time", "4s", "--eval-at", "3", "--eval-views", "1"});
   CHECK(contains(outcome.err, "iterations, up to"));
-  CHECK(contains(outcome.err, "of training"));
+  CHECK(contains(outcome.err, "of training, not counting 2 evaluations of 3 views in all"));
   CHECK(value_of(timed, "iterations") != "10000");
   CHECK(value_of(timed, "max-gaussians") != "0");
   const std::string end = value_of(timed, "end-iteration");  // known once the last steps are timed

@@ -270,6 +270,57 @@ TEST_CASE("a signal ends an evaluation within a view, with 130") {
   CHECK(entries(folder / "eval") == 0);
 }
 
+TEST_CASE("a signal breaks off an evaluation of a run, which the resumed run makes up for") {
+  const TemporaryFolder folder;
+  // Seconds of evaluation: a picture of every view is written too.
+  REQUIRE(raysplats_program({"generate", "-o", folder / "data", "--size", "200", "--train-views",
+                             "4", "--test-views", "60", "-q"})
+              .code == 0);
+  // One before density control, and the last one.
+  for (const int at : {16, kIterations}) {
+    CAPTURE(at);
+    const auto training = [&](const std::string& name) {
+      Words words = tiny_training(folder / (name + std::to_string(at))) +
+                    Words{"--eval-at", std::to_string(at), "--eval-renders", "60"};
+      words[1] = folder / "data";
+      return words;
+    };
+    const std::string whole = training("whole")[3], run = training("broken")[3];
+    const std::string evaluation = "/eval/iteration_" + std::to_string(at);
+    REQUIRE(raysplats_program(training("whole")).code == 0);
+
+    Words words = training("broken");
+    std::erase(words, "-q");
+    Surroundings there;
+    there.terminal = true;
+    RunningProgram program(words, there);
+    while (program.runs() && !contains(program.errors(), "Evaluating"))
+      std::this_thread::sleep_for(1ms);
+    REQUIRE(::kill(program.process(), SIGTERM) == 0);
+    const Outcome outcome = program.wait();
+    INFO(outcome.err);
+    CHECK(outcome.code == 130);
+    CHECK(contains(outcome.err, "Interrupted at iteration " + std::to_string(at)));
+    CHECK(!contains(outcome.err, "60 test views"));
+    CHECK(std::filesystem::exists(model_of(run, at)));
+    CHECK(raysplats::load_latest_checkpoint(run).iteration == at);
+    CHECK(!std::filesystem::exists(run + evaluation));
+    const std::string state =
+        at < kIterations ? "not over: 16 of 30 iterations" : "though all 30 iterations are done";
+    CHECK(contains(read_file(run + "/report.html"), state));
+    CHECK(temporaries(run) == 0);
+
+    const Outcome resumed = raysplats_program(training("broken") + Words{"--resume", "latest"});
+    INFO(resumed.err);
+    REQUIRE(resumed.code == 0);
+    CHECK(same_result(run, whole));
+    const std::string measures = read_file(run + evaluation + "/metrics.json");
+    CHECK(!measures.empty());
+    CHECK(measures == read_file(whole + evaluation + "/metrics.json"));
+    CHECK(entries(run + evaluation) == entries(whole + evaluation));
+  }
+}
+
 TEST_CASE("a folder takes one run at a time, and a lock that was left behind none") {
   const TemporaryFolder folder;
   const std::string run = folder / "run";

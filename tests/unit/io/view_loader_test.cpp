@@ -95,6 +95,21 @@ TEST_CASE("a picture above the budget is returned and not kept, and outlives its
   CHECK(loader.cached_bytes() == 0);
 }
 
+TEST_CASE("a wait ends when the picture is there, has failed, or the time is over") {
+  const Scratch scratch;
+  auto views = make_views(scratch, 2);
+  views[1].image_path = scratch / "none.png";
+  io::ViewLoader loader(views, 5 * kBytes);
+  CHECK(!loader.wait(0, 0.01));  // nobody has asked for it
+  loader.prefetch(std::vector<std::size_t>{0, 1});
+  CHECK(loader.wait(0, 600));
+  CHECK(loader.wait(1, 600));
+  CHECK(loader.get(0)->words.size() == kSide * kSide);
+  CHECK_THROWS_AS(loader.get(1), DataError);
+  CHECK(loader.wait(2, 600));
+  CHECK_THROWS_AS(loader.get(2), UsageError);
+}
+
 TEST_CASE("what is forgotten is read again") {
   const Scratch scratch;
   const auto views = make_views(scratch, 2);

@@ -6,6 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+#include <limits>
 #include <vector>
 
 #include "util/rng.hpp"
@@ -62,6 +66,37 @@ TEST_CASE("neighbour distances equal brute force") {
   for (const bool degenerate : {false, true}) {
     for (const std::size_t count : {0u, 1u, 2u, 3u, 4u, 5u, 300u})
       check_brute_force(random_positions(count, degenerate));
+  }
+}
+
+TEST_CASE("the nearest point of a tree is as far away as comparing all tells, to the last bit") {
+  for (const bool degenerate : {false, true}) {
+    for (const std::size_t count : {0u, 1u, 2u, 3u, 100u, 1000u}) {
+      const std::vector<float> random = random_positions(count, degenerate);
+      // Numbers that no float holds.
+      std::vector<double> positions(random.begin(), random.end());
+      if (!degenerate) {
+        for (double& value : positions) value /= 3;
+      }
+      const KdTree<double> tree(positions);
+      CounterRng rng(9, count);
+      for (int n = 0; n < 300; ++n) {
+        // Far off, among the points, and where one may be.
+        const double reach = n % 3 == 0 ? 100.0 : 1.0;
+        glm::dvec3 place(reach * rng.normal(), reach * rng.normal(), reach * rng.normal());
+        if (n % 3 == 2) place = glm::round(place);
+        double least = std::numeric_limits<double>::infinity();
+        for (std::size_t i = 0; i < positions.size(); i += 3) {
+          const glm::dvec3 point(positions[i], positions[i + 1], positions[i + 2]);
+          least = std::min(least, glm::distance(point, place));
+        }
+        CHECK(tree.nearest_distance({place.x, place.y, place.z}) == least);
+        for (const double within : {0.3, 1.0, 2.0}) {
+          CHECK(tree.nearest_distance({place.x, place.y, place.z}, within) ==
+                (least < within ? least : std::numeric_limits<double>::infinity()));
+        }
+      }
+    }
   }
 }
 

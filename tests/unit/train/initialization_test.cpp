@@ -5,11 +5,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
 #include <limits>
+#include <vector>
 
 #include "raysplats/error.hpp"
+#include "scene/kd_tree.hpp"
 #include "unit/log_capture.hpp"
 #include "unit/train/test_photos.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -49,6 +54,37 @@ TEST_CASE("points become Gaussians with their colour, clamped scales and the opa
   one.positions.assign(3, 0.0f);
   one.colors.assign(3, 0.5f);
   CHECK(first_size(one) == doctest::Approx(2.0));
+}
+
+TEST_CASE("Gaussians of points have the bytes of a loop over all points and cameras") {
+  std::vector<Camera> cameras = ring(60, 4.0, {0.3, -0.2, 0.1});
+  CounterRng rng(5, 1);
+  PointCloud points;
+  for (int i = 0; i < 3 * 3000; ++i) {
+    // Many far from each other, whose sizes the cameras bound.
+    points.positions.push_back(static_cast<float>(4.0 * rng.normal()));
+    points.colors.push_back(static_cast<float>(rng.uniform()));
+  }
+  const Gaussians model = gaussians_from_points(points, 1, 0.1, cameras);
+  REQUIRE(model.size() == points.size());
+  CHECK(model.means == points.positions);
+  const double least = 1e-4 * scene_extent(cameras, points);
+  const std::vector<float> sizes = neighbour_distances(points.positions);
+  std::size_t bounded = 0;
+  std::vector<float> expected;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Camera& camera : cameras)
+      nearest = std::min(nearest, glm::distance(camera.center(), glm::dvec3(p[0], p[1], p[2])));
+    const auto size = static_cast<double>(sizes[i]);
+    if (size > 0.1 * nearest) ++bounded;
+    const double scale = std::max(std::min(size, 0.1 * nearest), least);
+    expected.insert(expected.end(), 3, static_cast<float>(std::log(scale)));
+  }
+  CHECK(model.log_scales == expected);
+  CHECK(bounded > 100);
+  CHECK(bounded < 2900);
 }
 
 TEST_CASE("points that few photos show or that fit them badly are left out when enough remain") {

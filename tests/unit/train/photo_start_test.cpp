@@ -140,6 +140,19 @@ TEST_CASE("photos of other exposures agree once they are balanced") {
   CHECK(photos[3].gain[0] == doctest::Approx(gain[0]).epsilon(1e-4));
 }
 
+TEST_CASE("lamps at night set the range of colours, a speck does not") {
+  const Camera camera = look_at({0, 0, 0}, {4, 0, 0}, {0, 0, 1}, 100, 100, 100);
+  // White within so many pixels of the middle.
+  const auto night = [&camera](double radius) {
+    return std::vector{photo_of(camera, [&](const CameraRay& ray) {
+      const double off = 100.0 * std::hypot(ray.direction.y, ray.direction.z) / ray.direction.x;
+      return glm::dvec4(glm::dvec3(off < radius ? 1.0 : 0.01), 1.0);
+    })};
+  };
+  CHECK(color_range(night(3.6)) > 0.9);  // 40 of 10 000 pixels
+  CHECK(color_range(night(1.0)) < 0.02);
+}
+
 TEST_CASE("a random start fills the region and what the photos see, in their colours") {
   const Region region{{1, 2, 3}, 0.5};
   const std::vector<SmallPhoto> photos = photos_of_wall();

@@ -125,6 +125,46 @@ TEST_CASE("a motion that all cameras have in common is taken off, and nothing el
   for (std::size_t i = 0; i < 6; ++i) CHECK(std::abs(kept.state().deltas[6 * 8 + i]) < 0.01f);
 }
 
+TEST_CASE("views that are not trained stay, and do not hide what the trained ones have in common") {
+  const std::vector<Camera> start = ring(24);
+  const std::vector<std::size_t> apart{3, 9, 20};
+  PoseRefinement poses(start, kExtent, subject_distances(start, {}, kExtent), 0.0, apart);
+  // All photos ask for the same motion of the scene, a turn and a shift.
+  const glm::dvec3 turn(0.02, -0.04, 0.03), shift(0.2, 0.1, -0.3);
+  const auto target = [&](const Camera& camera) {
+    return moved(camera, -(camera.rotation * turn), glm::cross(turn, camera.center()) + shift);
+  };
+  CounterRng rng(7, 0);
+  for (int pass = 0; pass < 20; ++pass) {
+    for (std::size_t view = 0; view < start.size(); ++view) {
+      if (std::binary_search(apart.begin(), apart.end(), view)) continue;
+      PoseGradient gradient = towards(poses.camera(view), target(start[view]));
+      gradient.rotation[0] += 0.1 * rng.normal();
+      poses.step(view, gradient, 2e-3);
+    }
+  }
+  const std::vector<float>& deltas = poses.state().deltas;
+  double most = 0.0;
+  glm::dvec3 mean_shift(0.0), torque(0.0);
+  for (std::size_t view = 0; view < start.size(); ++view) {
+    const float* d = &deltas[PoseRefinement::kNumbers * view];
+    const bool trained = !std::binary_search(apart.begin(), apart.end(), view);
+    for (std::size_t k = 0; k < PoseRefinement::kNumbers; ++k) {
+      if (!trained) CHECK(d[k] == 0.0f);
+      most = std::max(most, std::abs(static_cast<double>(d[k])));
+    }
+    if (!trained) continue;
+    const glm::dvec3 moved_by(d[3], d[4], d[5]), turned(d[0], d[1], d[2]);
+    mean_shift += moved_by / 21.0;
+    // Least squares of a common turn leave none of it: W of what is left is 0.
+    torque += glm::cross(start[view].center(), moved_by) / (kExtent * kExtent) -
+              glm::transpose(start[view].rotation) * turned;
+  }
+  CHECK(most > 1e-3);
+  CHECK(glm::length(mean_shift) < 1e-5);
+  CHECK(glm::length(torque) < 1e-5);
+}
+
 TEST_CASE("a camera far from all others does not hide the motion that they have in common") {
   std::vector<Camera> start = ring(40);
   start.push_back(look_at({300 * kExtent, 0, 0}, {0, 0, 0}, {0, 0, 1}, 64, 48, 60.0));

@@ -8,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
@@ -16,6 +17,7 @@
 #include "trace/device_gaussians.hpp"
 #include "unit/fixture.hpp"
 #include "unit/text.hpp"
+#include "unit/train/depth_file.hpp"
 #include "unit/train/short_training.hpp"
 #include "util/atomic_file.hpp"
 
@@ -336,4 +338,42 @@ TEST_CASE("updates that were left out are counted over the whole run") {
   place.resumed(options, "run")->run(false);
   CHECK(place.metrics("run").at("skipped_updates") == 5);
   CHECK(load_latest_checkpoint(place.run("run")).skipped_updates == 5);
+}
+
+TEST_CASE("a run goes on with another weight of depths, or none, but not with other depth maps") {
+  const Place place;
+  Dataset data = load_dataset(place.folder / "data");
+  const auto write_maps = [&](float depth) {
+    for (std::size_t i = 0; i < data.views.size(); ++i) {
+      View& view = data.views[i];
+      view.depth_path = place.folder / (std::to_string(i) + ".npy");
+      const auto pixels = static_cast<std::size_t>(view.camera.width * view.camera.height);
+      write_depth_file(view.depth_path, view.camera.width, view.camera.height,
+                       std::vector<float>(pixels, depth));
+    }
+  };
+  write_maps(4000);
+  const auto trainer = [&](const char* name, double weight) {
+    TrainOptions options = growing();
+    options.depth_weight = weight;
+    return std::make_unique<Trainer>(shared_test_context(), data, options, place.run(name));
+  };
+  const auto resumed_at = [&](const char* name, double weight) {
+    const auto out = trainer(name, weight);
+    out->resume("latest");
+    return out->iteration();
+  };
+  trainer("photos", 0)->run(false);
+  trainer("depths", 0.3)->run(false);
+  CHECK(resumed_at("photos", 0.3) == kIterations);
+  CHECK(resumed_at("depths", 0) == kIterations);
+  CHECK(resumed_at("depths", 0.5) == kIterations);
+
+  write_maps(5000);
+  CHECK(resumed_at("photos", 0.3) == kIterations);
+  for (const double weight : {0.0, 0.3}) {
+    CAPTURE(weight);
+    CHECK(contains(message_of<UsageError>([&] { (void)resumed_at("depths", weight); }),
+                   "other data"));
+  }
 }

@@ -41,6 +41,8 @@ TEST_CASE("an estimate leaves no trace in the run, whatever its strategy and opt
     CHECK(estimate.seconds > 0);
     CHECK(estimated.iteration() == 0);
     const TrainSummary summary = estimated.run(false);
+    CHECK(estimate.evaluations == summary.evaluations.size());
+    CHECK(estimate.evaluated_views == summary.evaluations.size());  // of one view
     CHECK(summary.gaussians <= estimate.gaussians);
     check_equal(plain.model(), estimated.model());
     CHECK_THROWS_AS(estimated.estimate(0.3), UsageError);
@@ -107,6 +109,24 @@ TEST_CASE("a run by time names its length, and a replay of its configuration giv
   CHECK(replayed.max_gaussians == static_cast<std::int64_t>(estimate.gaussians));
   Trainer again(shared_test_context(), load_dataset(data), replayed, folder.path() / "again");
   again.run(false);
+  check_equal(trainer.model(), again.model());
+}
+
+TEST_CASE("a run by time whose limit is given keeps the first model that was measured") {
+  const TemporaryDirectory folder;
+  const fs::path data = folder.path() / "data";
+  make_photos(data, 48, 8, 1);
+  TrainOptions options = short_training(10000);
+  options.trace.deterministic = true;
+  options.max_gaussians = 400;
+  Trainer trainer(shared_test_context(), load_dataset(data), options, folder.path() / "run");
+  trainer.fit_time(4);
+  trainer.step(2);
+  trainer.save();
+  TrainOptions replayed;
+  read_train_config(folder.path() / "run" / "config.toml", replayed);
+  Trainer again(shared_test_context(), load_dataset(data), replayed, folder.path() / "again");
+  again.step(2);
   check_equal(trainer.model(), again.model());
 }
 

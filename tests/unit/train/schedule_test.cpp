@@ -282,8 +282,45 @@ TEST_CASE("validation takes place every tenth of a run until its views join") {
   for (std::int64_t i = 1; i <= 1000; ++i) times += validates_at(options, i) ? 1 : 0;
   CHECK(times == 9);
   CHECK(validation_end(options) == 900);
+  CHECK(validation_join(options) == 900);
   CHECK(validates_at(options, 900));
   CHECK_FALSE(validates_at(options, 1000));
+  // With poses as often, though the views never join: not in the longest run that can be asked for.
+  options.poses = true;
+  CHECK(validates_at(options, 900));
+  CHECK_FALSE(validates_at(options, 1000));
+  CHECK(validation_join(options) > 1'000'000'000'000'000);
+}
+
+TEST_CASE("the evaluations and validations of a run are counted before it begins") {
+  TrainOptions options;
+  for (const std::int64_t iterations : {1, 7, 40, 1000}) {
+    for (const std::int64_t every : {0, 1, 7, 500}) {
+      for (const std::int64_t end : {0, 5}) {
+        CAPTURE(iterations);
+        CAPTURE(every);
+        CAPTURE(end);
+        options.iterations = iterations;
+        options.end_iteration = end > iterations ? 0 : end;
+        options.eval_every = every;
+        options.eval_at = {0.5, 7, 21, 2000};
+        options.validate_views = 2;
+        std::set<std::int64_t> evaluated{last_iteration(options)};
+        std::size_t validations = 0;
+        for (std::int64_t i = 1; i <= last_iteration(options); ++i) {
+          if (every > 0 && i % every == 0) evaluated.insert(i);
+          for (const RunShare& share : options.eval_at) {
+            if (share.of(iterations) == i) evaluated.insert(i);
+          }
+          validations += validates_at(options, i) ? 1 : 0;
+        }
+        CHECK(evaluation_count(options) == evaluated.size());
+        CHECK(validation_count(options) == validations);
+        options.validate_views = 0;
+        CHECK(validation_count(options) == 0);
+      }
+    }
+  }
 }
 
 TEST_CASE("a random background is a function of seed and iteration, for cut-out photos only") {
@@ -299,8 +336,8 @@ TEST_CASE("a random background is a function of seed and iteration, for cut-out 
 }
 
 TEST_CASE(
-    "steps are alike once photos are whole, bands are on, density control is over and flat "
-    "Gaussians are flat") {
+    "steps are alike once photos are whole, bands are on, the number of Gaussians no longer grows "
+    "and flat ones are flat") {
   TrainOptions options;
   options.iterations = 1000;
   options.densify_until = 0.5;
@@ -319,4 +356,17 @@ TEST_CASE(
   CHECK(last_iteration(options) == 1000);
   options.end_iteration = 800;
   CHECK(last_iteration(options) == 800);
+}
+
+TEST_CASE("steps that are alike from the beginning are timed from the first one's end on") {
+  TrainOptions options;
+  options.iterations = 1000;
+  options.densify_until = 0;
+  options.resolution_schedule = {};
+  options.sh_degree = 0;
+  CHECK(steady_from(options) == 1);
+  options.sh_degree = 3;
+  options.sh_degree_interval = 0;
+  CHECK(steady_from(options) == 1);
+  CHECK(timed_until(options) > 1);
 }

@@ -316,6 +316,54 @@ TEST_CASE("a signal ends the run with everything saved") {
                                 "point_cloud.ply"));
 }
 
+TEST_CASE("a signal breaks off the last evaluation, which the resumed run makes up for") {
+  Photos photos;
+  TrainOptions options = small_options();
+  options.eval_at = {};
+  const auto folder = photos.folder / "run";
+  const auto is_complete = [&] {
+    return nlohmann::json::parse(std::ifstream(folder / "metrics.json")).at("complete") == true;
+  };
+  {
+    Trainer trainer(photos.context, photos.dataset, options, folder);
+    trainer.on_step([&](const TrainProgress& progress) {
+      if (progress.iteration == progress.iterations) std::raise(SIGTERM);
+    });
+    bool interrupted = false;
+    try {
+      trainer.run(false);
+    } catch (const Error& error) {
+      interrupted = error.code() == ErrorCode::kInterrupted;
+    }
+    CHECK(interrupted);
+    CHECK(trainer.iteration() == options.iterations);
+  }
+  CHECK_FALSE(is_complete());
+  const auto name = "iteration_" + std::to_string(options.iterations);
+  CHECK(load_latest_checkpoint(folder).iteration == options.iterations);
+  CHECK(std::filesystem::exists(folder / "point_cloud" / name / "point_cloud.ply"));
+  CHECK_FALSE(std::filesystem::exists(folder / "eval" / name));
+  Trainer resumed(photos.context, photos.dataset, options, folder);
+  resumed.resume("latest");
+  CHECK(resumed.run(false).evaluations.size() == 1);
+  CHECK(is_complete());
+  CHECK(std::filesystem::exists(folder / "eval" / name / "metrics.json"));
+}
+
+TEST_CASE("stop() breaks off the last evaluation, and evaluate() makes it afterwards") {
+  Photos photos;
+  TrainOptions options = small_options();
+  options.eval_at = {};
+  Trainer trainer(photos.context, photos.dataset, options, photos.folder / "run");
+  trainer.on_step([&](const TrainProgress& progress) {
+    if (progress.iteration == progress.iterations) trainer.stop();
+  });
+  const TrainSummary summary = trainer.run(false);
+  CHECK(summary.iterations == options.iterations);
+  CHECK(summary.evaluations.empty());
+  CHECK(trainer.evaluate().iteration == options.iterations);
+}
+
 TEST_CASE("a loss that is not finite stops the run and names the iteration") {
   Photos photos;
   Gaussians model;

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <glm/geometric.hpp>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -119,6 +121,89 @@ TEST_CASE("validation photos influence nothing until nine tenths of the run, the
   }
   check_equal(early[0], early[1], true);
   check_equal(late[0], late[1], false);
+}
+
+TEST_CASE("a signal breaks off a validation, which the resumed run makes up for") {
+  const TemporaryDirectory folder;
+  const fs::path data = folder.path() / "data", straight = folder.path() / "straight",
+                 broken = folder.path() / "broken";
+  make_photos(data, kSize, kTrainViews, 1);
+  TrainOptions options = options_of(60, 2);
+  options.poses = true;  // each view is moved to where it fits
+  options.exposure = true;
+  Trainer whole(shared_test_context(), load_dataset(data), options, straight);
+  whole.run(false);
+  {
+    Trainer part(shared_test_context(), load_dataset(data), options, broken);
+    part.on_step([&](const TrainProgress& progress) {
+      if (progress.iteration == 12) std::raise(SIGTERM);
+    });
+    CHECK_THROWS_AS(part.run(false), Error);
+  }
+  REQUIRE(validates_at(options, 12));
+  CHECK(metrics_of(broken).at("validations").size() == 1);
+  Trainer rest(shared_test_context(), load_dataset(data), options, broken);
+  rest.resume("latest");
+  CHECK(rest.iteration() == 12);
+  rest.run(false);
+  const auto psnr = [](const fs::path& run) {
+    const nlohmann::json rows = metrics_of(run).at("validations");
+    std::vector<double> out;
+    for (const nlohmann::json& row : rows) out.push_back(row.at("psnr").get<double>());
+    return out;
+  };
+  CHECK(psnr(broken).size() == 9);
+  CHECK(psnr(broken) == psnr(straight));
+  check_equal(rest.model(), whole.model(), true);
+}
+
+TEST_CASE("with poses validation photos influence nothing to the end, and their poses stay") {
+  const TemporaryDirectory folder;
+  const fs::path data = folder.path() / "data";
+  make_photos(data, kSize, kTrainViews, 1);
+  const Dataset dataset = load_dataset(data);
+  const std::vector<std::size_t> train = dataset.indices(Split::kTrain);
+  std::vector<std::size_t> judges;
+  for (const std::size_t i : validation_views(train.size(), 2)) judges.push_back(train[i]);
+  TrainOptions options = options_of(40, 2);
+  options.poses = true;
+
+  // Interrupted where other runs train on all views, with the same end.
+  Trainer broken(shared_test_context(), load_dataset(data), options, folder.path() / "broken");
+  broken.step(38);
+  broken.save();
+  std::vector<Gaussians> models;
+  for (const char* name : {"clean", "rest", "noise"}) {
+    const fs::path run = folder.path() / name;
+    Trainer trainer(shared_test_context(), load_dataset(data), options, run);
+    if (name == std::string("rest")) trainer.resume(folder.path() / "broken");
+    trainer.run(false);
+    models.push_back(trainer.model());
+    // Photos that no step has seen are not among those that the run says something of.
+    if (name != std::string("rest")) CHECK(metrics_of(run).at("photos").size() == kTrainViews - 2);
+    if (name == std::string("rest"))
+      for (const std::size_t i : judges) make_noise_of(dataset.views[i].image_path);
+  }
+  check_equal(models[0], models[1], true);
+  check_equal(models[0], models[2], true);
+
+  const std::vector<Camera> refined = read_cameras(folder.path() / "clean/cameras_refined.json");
+  REQUIRE(refined.size() == train.size());
+  for (std::size_t i = 0; i < refined.size(); ++i) {
+    CAPTURE(i);
+    const bool judge = std::find(judges.begin(), judges.end(), train[i]) != judges.end();
+    const Camera& given = dataset.views[train[i]].camera;
+    CHECK((glm::distance(refined[i].center(), given.center()) < 1e-9) == judge);
+  }
+
+  // A longer run goes on to be judged by them.
+  options.iterations = 80;
+  Trainer longer(shared_test_context(), load_dataset(data), options, folder.path() / "noise");
+  const LogCapture log;
+  longer.resume("latest");
+  CHECK_FALSE(log.contains("stay in the loss"));
+  longer.run(false);
+  CHECK(metrics_of(folder.path() / "noise").at("validations").back().at("iteration") == 72);
 }
 
 TEST_CASE("validation is recorded, resumed runs end with the same bytes, the best model is kept") {
