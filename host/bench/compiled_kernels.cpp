@@ -45,7 +45,7 @@ const std::vector<CompiledKernel>& compiled_kernels() {
       {"sm_90", "group forward render: trace_forward_group", 56, 7952, 32, 32},
       {"sm_90", "group forward train: trace_forward_group", 63, 7960, 32, 32},
       {"sm_90", "group backward atomic: trace_backward_group", 64, 7712, 32, 32},
-      {"sm_90", "finalize group sh3: finalize_group", 64, 4096, 64, 32},
+      {"sm_90", "finalize group sh3: finalize_group", 72, 4096, 64, 32},
       {"sm_90", "loss group: group_ssim_derivatives", 58, 12064, 256, 32},
       {"sm_90", "loss group: group_gradient", 32, 13104, 256, 32},
       {"sm_90", "adam sh3: adam_step", 36, 0, 64, 32},

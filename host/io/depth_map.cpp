@@ -113,11 +113,12 @@ DepthMap from_map(const DepthMap& map, const View& view) {
         down = point->y / photo.height;
         if (other_depths) share = 1.0 / (camera.rotation * ray.direction).z;
       }
-      const auto column = static_cast<int>(std::floor(across * map.width));
-      const auto row = static_cast<int>(std::floor(down * map.height));
-      if (column < 0 || row < 0 || column >= map.width || row >= map.height) continue;
-      const float depth =
-          map.values[pixel_count(map.width, row) + static_cast<std::size_t>(column)];
+      // What a lens shows far beyond the photo fits no integer.
+      const double column = std::floor(across * map.width), row = std::floor(down * map.height);
+      const bool inside = column >= 0 && row >= 0 && column < map.width && row < map.height;
+      if (!inside) continue;
+      const float depth = map.values[pixel_count(map.width, static_cast<int>(row)) +
+                                     static_cast<std::size_t>(column)];
       out.values[pixel_count(camera.width, y) + static_cast<std::size_t>(x)] =
           static_cast<float>(share * static_cast<double>(depth));
     }

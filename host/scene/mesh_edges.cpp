@@ -69,13 +69,15 @@ class NearVertices {
 
  private:
   // So wide that few positions lie nearer to a cell's border than they may lie to each other.
-  static constexpr double kWidth = 64;  // times `near`
+  static constexpr double kWidth = 64;       // times `near`
+  static constexpr double kFarthest = 1e18;  // cells, which an integer holds
 
   Cell cell(std::size_t i, double moved) const {
     Cell out;
     for (std::size_t c = 0; c < 3; ++c) {
       const double position = static_cast<double>(positions_[3 * i + c]) + moved;
-      out[c] = static_cast<std::int64_t>(std::floor(position / (kWidth * near_)));
+      out[c] = static_cast<std::int64_t>(
+          std::clamp(std::floor(position / (kWidth * near_)), -kFarthest, kFarthest));
     }
     return out;
   }

@@ -152,7 +152,8 @@ DepthSteps steps_of(std::span<const SmallPhoto> photos,
   const double next = depths.typical * std::exp(usual.log_step());
   const double moved =
       apart(photos, neighbours, point_on(pixel.ray, depths.typical), point_on(pixel.ray, next));
-  const auto finer = std::min(kMostFiner, static_cast<std::size_t>(std::ceil(moved / kMostMoved)));
+  const double wanted = std::min(static_cast<double>(kMostFiner), std::ceil(moved / kMostMoved));
+  const auto finer = static_cast<std::size_t>(wanted);
   if (finer <= 1) return usual;
   std::size_t first = kDepths, last = 0;
   for (std::size_t step = 0; step < kDepths; ++step) {

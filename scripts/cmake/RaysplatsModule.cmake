@@ -13,7 +13,7 @@ function(raysplats_compile_options target)
   target_compile_options(${target} PRIVATE ${RAYSPLATS_WARNINGS})
   if(RAYSPLATS_SANITIZE)
     target_compile_options(${target} PRIVATE -fsanitize=${RAYSPLATS_SANITIZE} -fno-omit-frame-pointer
-                                             -fno-sanitize-recover=undefined)
+                                             -fno-sanitize-recover=undefined,float-cast-overflow)
     target_link_options(${target} PUBLIC -fsanitize=${RAYSPLATS_SANITIZE})
   endif()
 endfunction()
