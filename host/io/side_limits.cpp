@@ -22,11 +22,12 @@ struct SideLimit {
 
 // PNG has numbers for more, but libpng neither writes nor reads it, and that is what browsers read
 // APNG with. GIF would be written with the number's lower 16 bits; libjpeg ends the process.
-constexpr std::array<SideLimit, 5> kLimits{{{".jpg", "JPEG", 65500},
+constexpr std::array<SideLimit, 6> kLimits{{{".jpg", "JPEG", 65500},
                                             {".jpeg", "JPEG", 65500},
                                             {".png", "PNG", 1000000},
                                             {".apng", "APNG", 1000000},
-                                            {".gif", "GIF", 65535}}};
+                                            {".gif", "GIF", 65535},
+                                            {".mp4", "H.264", 16384}}};
 
 }  // namespace
 

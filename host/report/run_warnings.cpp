@@ -119,7 +119,7 @@ bool has_visited(const Json& metrics, const Settings& settings, double iteration
 /// that tells of exposure; 0 elsewhere.
 double gained_by_colors(const Json& metrics, const Settings& settings) {
   constexpr double kSteps = 100, kVisits = 3;  // before that colours are still on their way
-  constexpr double kNear = 18;     // dB; fitted colours bring any photo near to a model that fails
+  constexpr double kNear = 22;     // dB; fitted colours bring any photo near to a model that fails
   constexpr double kSeen = 0.025;  // root of the mean square; less is nothing of a dark scene
   const std::vector<Json> evaluations = objects(metrics, "evaluations");
   const auto exposure = settings.find("exposure");

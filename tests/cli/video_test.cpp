@@ -240,6 +240,7 @@ TEST_CASE("sizes that the format cannot hold are refused before a device is aske
   const Words high{"--width", "2", "--height", "1048576"};
   const std::string video = folder / "a";
   refused(wide, {"--video", video + ".gif"}, "GIF has at most 65535 a side");
+  refused(wide, {"--video", video + ".mp4"}, "H.264 has at most 16384 a side");
   refused(high, {"--video", video + ".apng"}, "APNG has at most 1000000 a side");
   refused(wide, {"-o", video, "--format", "jpg"}, "JPEG has at most 65500 a side");
   refused(high, {"-o", video}, "PNG has at most 1000000 a side");

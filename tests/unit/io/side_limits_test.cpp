@@ -35,7 +35,7 @@ TEST_CASE("every format has its largest side, either way round") {
   };
   for (const Limit& limit : {Limit{"a.jpg", "JPEG", 65500}, Limit{"b/a.JPEG", "JPEG", 65500},
                              Limit{"a.png", "PNG", 1000000}, Limit{"a.apng", "APNG", 1000000},
-                             Limit{"a.gif", "GIF", 65535}}) {
+                             Limit{"a.gif", "GIF", 65535}, Limit{"a.mp4", "H.264", 16384}}) {
     CAPTURE(limit.name);
     CHECK_NOTHROW(io::require_writable_size(limit.name, limit.most, limit.most));
     for (const bool wide : {false, true}) {
