@@ -100,10 +100,12 @@ PointCloud photo_points(const Dataset& dataset,
                         const std::optional<DepthRange>& depths,
                         std::size_t count,
                         double unsure,
-                        std::uint64_t seed) {
+                        std::uint64_t seed,
+                        bool checks_poses) {
   const double guess = typical_depth(cameras, dataset.points);
   if (dataset.alpha_is_background) {
-    check_poses(dataset, photos, probe_sweep(photos, depths_around(guess), seed).agreed, seed);
+    if (checks_poses)
+      check_poses(dataset, photos, probe_sweep(photos, depths_around(guess), seed).agreed, seed);
     PointCloud hull = carved_points(photos, region, count, seed);
     if (hull.size() > 0) return hull;
     spdlog::warn("the photos' alpha leaves no common body: the start fills the region instead");
@@ -117,7 +119,7 @@ PointCloud photo_points(const Dataset& dataset,
       found.nearest, found.farthest, found.typical, guess,
       found.open ? "; they leave depths open" : "");
   SweptPoints swept = swept_points(photos, found, count, unsure, seed);
-  check_poses(dataset, photos, swept.agreed, seed);
+  if (checks_poses) check_poses(dataset, photos, swept.agreed, seed);
   return std::move(swept.points);
 }
 
@@ -387,7 +389,8 @@ Gaussians initial_model(const Dataset& dataset,
                         std::span<const Camera> cameras,
                         const PhotoSource& photos,
                         std::size_t limit,
-                        const TrainOptions& options) {
+                        const TrainOptions& options,
+                        bool checks_poses) {
   constexpr double kUnsureShare = 0.25;  // of points of photos everywhere: those in no clear depth
   constexpr double kUnsureBeside = 0.1;  // of those in places of sparse ones: more are only slower
   const bool has_points = dataset.points.size() > 0;
@@ -428,8 +431,9 @@ Gaussians initial_model(const Dataset& dataset,
       photos(begun.beside.part == Beside::Part::kNothing ? PhotoChoice::kAll : PhotoChoice::kMany);
   const std::size_t room = std::min(begun.count, limit - std::min(limit, begun.points.size()));
   const bool in_their_places = begun.beside.part == Beside::Part::kInTheirPlaces;
-  PointCloud seen = photo_points(dataset, cameras, region, told, begun.beside.depths, room,
-                                 in_their_places ? kUnsureBeside : kUnsureShare, options.seed);
+  PointCloud seen =
+      photo_points(dataset, cameras, region, told, begun.beside.depths, room,
+                   in_their_places ? kUnsureBeside : kUnsureShare, options.seed, checks_poses);
   if (in_their_places) seen = beside_points(seen, begun.sparse, photos(PhotoChoice::kSome));
   for (std::size_t i = 0; i < seen.size(); ++i) append_point(seen, i, begun.points);
   return start(begun.points);

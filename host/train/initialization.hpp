@@ -52,12 +52,14 @@ using PhotoSource = std::function<const std::vector<SmallPhoto>&(PhotoChoice)>;
 /// The model a run starts from, by options.init, at most `limit` Gaussians (an even subset of more;
 /// of points and photos at most half of it, so that there is room to grow; all of it, with a
 /// warning, where options.init_count asks for more), all within options.bounds. Sparse points that
-/// photos contradict (plausible()) are left out by `auto`, with a warning. Throws UsageError
+/// photos contradict (plausible()) are left out by `auto`, with a warning. `checks_poses`: whether
+/// poses that no points vouch for are looked at (check_poses()). Throws UsageError
 /// when the data set has no points and `colmap` is asked for, DataError for a bad PLY.
 Gaussians initial_model(const Dataset& dataset,
                         std::span<const Camera> cameras,
                         const PhotoSource& photos,
                         std::size_t limit,
-                        const TrainOptions& options);
+                        const TrainOptions& options,
+                        bool checks_poses = true);
 
 }  // namespace raysplats

@@ -287,7 +287,8 @@ struct Trainer::Impl {
   std::int64_t iteration = 0;                                   // completed
   std::map<std::size_t, std::vector<SmallPhoto>> small_photos;  // so many, once asked for
   std::optional<Gaussians> first_model;                         // made before start()
-  bool shows_progress = false;                                  // of what precedes the first step
+  bool poses_checked = false;   // by a first model, of which --time may make two
+  bool shows_progress = false;  // of what precedes the first step
   bool started = false;
   bool ended = false;    // before its time, by patience
   bool cut_off = false;  // with the evaluation of its newest iteration still to be made

@@ -137,9 +137,19 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
   const auto cuts = [](const TrainOptions& o) { return o.data.masks == MaskUse::kCutout; };
   differs("masks = cutout", cuts(before), cuts(options));
   const auto alpha = [](const TrainOptions& o, AlphaUse use) { return o.data.alpha == use; };
-  for (const auto& [name, use] : {std::pair{"alpha = cutout", AlphaUse::kCutout},
-                                  std::pair{"alpha = ignore", AlphaUse::kIgnore}})
-    differs(name, alpha(before, use), alpha(options, use));
+  // Runs name their background, but for those of cut-out photos; what `auto` makes of transparency
+  // may differ between versions.
+  const bool was_cut_out = before.background == "auto" && checkpoint.iteration > 0;
+  const bool by_auto = was_cut_out && alpha(before, AlphaUse::kAuto);
+  if (by_auto && !cut_out && alpha(options, AlphaUse::kAuto)) {
+    spdlog::warn(
+        "the run names no background, as those of cut-out photos, which the photos of {} are not: "
+        "if they were, resume with --alpha cutout",
+        dataset.root.string());
+  }
+  if (!(by_auto && alpha(options, AlphaUse::kCutout)))
+    differs("alpha = cutout", alpha(before, AlphaUse::kCutout), alpha(options, AlphaUse::kCutout));
+  differs("alpha = ignore", alpha(before, AlphaUse::kIgnore), alpha(options, AlphaUse::kIgnore));
 }
 
 // Models that come after the state to go on from are written again by a run of the length that they

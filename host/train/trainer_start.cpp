@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <utility>
 
 #include "io/dataset_views.hpp"
 #include "run/former_metrics.hpp"
@@ -283,7 +284,7 @@ Gaussians Trainer::Impl::new_model(std::size_t most) {
   }
   Gaussians model = initial_model(
       dataset, train_cameras, [this](PhotoChoice choice) -> const auto& { return photos(choice); },
-      most, options);
+      most, options, !std::exchange(poses_checked, true));
   if (model.size() > 0) return model;
   if (options.bounds)
     throw UsageError("No Gaussian of the start lies within --bounds: give a larger box");

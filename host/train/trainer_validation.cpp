@@ -51,11 +51,14 @@ void Trainer::Impl::restore_joined_views(const Checkpoint& checkpoint) {
   const bool trained_on = planned > 0 && checkpoint.iteration > planned;
   if (trained_on && planned < validation_join(options)) {
     joined = planned;
-    spdlog::warn(
-        "the run was to be shorter, and its {} validation views have been trained on since "
-        "iteration {}: they stay in the loss and judge no more; a new run of this length would be "
-        "judged up to nine tenths of it",
-        apart.size(), planned);
+    // Runs of older versions that train poses took them up as well.
+    if (planned < validation_end(options)) {
+      spdlog::warn(
+          "the run was to be shorter, and its {} validation views have been trained on since "
+          "iteration {}: they stay in the loss and judge no more; a new run of this length would "
+          "be judged up to nine tenths of it",
+          apart.size(), planned);
+    }
   }
   const std::size_t limit = density.limit();
   apply_options();
@@ -119,7 +122,7 @@ bool Trainer::Impl::out_of_patience() const {
 // At the end of a run: its best model stays, and is named, if the last validation was worse.
 void Trainer::Impl::keep_best_model() {
   const std::vector<EvaluationRow>& rows = run.validations();
-  if (rows.empty() || (iteration < last_iteration(options) && !ended)) return;
+  if (rows.empty()) return;
   const EvaluationRow& best = best_of(rows);
   if (best.psnr > rows.back().psnr + kMargin) {
     spdlog::warn(

@@ -16,6 +16,7 @@
 #include "run/checkpoint.hpp"
 #include "trace/device_gaussians.hpp"
 #include "unit/fixture.hpp"
+#include "unit/log_capture.hpp"
 #include "unit/text.hpp"
 #include "unit/train/depth_file.hpp"
 #include "unit/train/short_training.hpp"
@@ -376,4 +377,26 @@ TEST_CASE("a run goes on with another weight of depths, or none, but not with ot
     CHECK(contains(message_of<UsageError>([&] { (void)resumed_at("depths", weight); }),
                    "other data"));
   }
+}
+
+TEST_CASE("a run of cut-out photos that are taken for others is told how to go on") {
+  const Place place;
+  Dataset data = load_dataset(place.folder / "data");
+  REQUIRE(data.alpha_is_background);
+  const auto resumed_at = [&](AlphaUse use, bool cut_out) {
+    data.alpha_is_background = cut_out;
+    TrainOptions options = growing();
+    options.data.alpha = use;
+    Trainer trainer(shared_test_context(), data, options, place.run("run"));
+    trainer.resume("latest");
+    return trainer.iteration();
+  };
+  Trainer(shared_test_context(), data, growing(), place.run("run")).run(false);
+  const std::string advice = "if they were, resume with --alpha cutout";
+  const LogCapture log;
+  CHECK(resumed_at(AlphaUse::kAuto, true) == kIterations);
+  CHECK(resumed_at(AlphaUse::kCutout, true) == kIterations);
+  CHECK_FALSE(log.contains(advice));
+  CHECK(resumed_at(AlphaUse::kAuto, false) == kIterations);
+  CHECK(log.contains(advice));
 }
