@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "io/side_limits.hpp"
 #include "raysplats/error.hpp"
@@ -29,7 +30,7 @@ std::vector<std::uint8_t> rgb_bytes(const Image& frame) {
     for (std::size_t c = 0; c < 3; ++c) {
       const float given = frame.data[i * static_cast<std::size_t>(frame.channels) + c];
       const float value = given > 0.0f ? std::min(given, 1.0f) : 0.0f;
-      bytes.push_back(static_cast<std::uint8_t>(value * 255.0f + 0.5f));
+      bytes.push_back(static_cast<std::uint8_t>(std::lround(value * 255.0f)));
     }
   }
   return bytes;
