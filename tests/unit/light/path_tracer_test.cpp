@@ -266,55 +266,6 @@ TEST_CASE("scenes have no near limit, over meshes and beside them, in packets an
   }
 }
 
-TEST_CASE("rays that end on a surface count once where max_hits stops them") {
-  Context context = make_test_context();
-  Scene scene = cloud_scene();
-  scene.trace.max_hits = 1;
-  const auto counts = [&] {
-    PathTracer tracer(context, scene);
-    tracer.render(kCamera);
-    return tracer.statistics();
-  };
-  const std::uint64_t capped = counts().capped_rays;
-  CHECK(2 * capped > counts().camera_rays);
-  add_mesh(scene, rectangle({-3, -3, 2}, {6, 0, 0}, {0, 6, 0}, 0), diffuse({0.7f, 0.2f, 0.4f}));
-  // Packets know no wall, which all of the Gaussians are before.
-  CHECK(counts().capped_rays == capped);
-  scene.trace.traversal = Traversal::kBvh;
-  CHECK(counts().capped_rays == capped);
-}
-
-TEST_CASE("rays to lights that max_hits stops are counted") {
-  Context context = make_test_context();
-  // The cloud stands above the picture, between the floor and the lamp.
-  Scene scene = cloud_scene();
-  for (std::size_t i = 0; i < scene.gaussians.size(); ++i) scene.gaussians.means[3 * i + 1] -= 4.0f;
-  add_floor(scene);
-  Light high = lamp();
-  high.position = {0, -9, 0};
-  scene.lights = {high};
-  scene.render.shadows = {false, false, true, false, 1.0f};
-  const auto counts = [&] {
-    PathTracer tracer(context, scene);
-    tracer.render(kCamera);
-    return tracer.statistics();
-  };
-  CHECK(counts().capped_rays == 0);
-  scene.trace.max_hits = 1;
-  PathTracer::Statistics rays = counts();
-  CHECK(rays.capped_rays > 0);
-  CHECK(rays.capped_rays <= rays.shadow_rays);
-  scene.render.shadows.gaussians_on_mesh = false;
-  CHECK(counts().capped_rays == 0);
-  // From Gaussians too, beside the camera's own rays.
-  for (std::size_t i = 0; i < scene.gaussians.size(); ++i) scene.gaussians.means[3 * i + 1] += 4.0f;
-  const std::uint64_t of_camera = counts().capped_rays;
-  scene.render.shadows.gaussians_on_gaussians = true;
-  rays = counts();
-  CHECK(rays.capped_rays > of_camera);
-  CHECK(rays.capped_rays <= rays.camera_rays + rays.shadow_rays);
-}
-
 TEST_CASE("lights on Gaussians shade what packets see as what rays one by one see [small]") {
   Context context = make_test_context();
   Scene scene = cloud_scene(1);
@@ -433,56 +384,6 @@ TEST_CASE("environment pictures and textures") {
   for (float& x : wall.uvs) x = 2.5f * x - 0.7f;  // repeats
   add_mesh(scene, wall, painted);
   check_picture(context, scene, kCamera, "a texture", kLitByPicture);
-}
-
-TEST_CASE("pictures without all of their data are refused") {
-  Context context = make_test_context();
-  Scene scene = cloud_scene(2);
-  scene.environment.equirect = waves(64, 32);
-  scene.environment.equirect.data.pop_back();
-  CHECK_THROWS_AS(PathTracer(context, scene), UsageError);
-  scene = cloud_scene(2);
-  scene.textures = {waves(8, 8)};
-  scene.textures[0].data.clear();
-  CHECK_THROWS_AS(PathTracer(context, scene), UsageError);
-}
-
-TEST_CASE("meshes with a number that is not finite are refused, and the ones before stay") {
-  Context context = make_test_context();
-  Scene scene = cloud_scene();
-  add_mesh(scene, ball({0.2, 0.1, 0}, 0.7, 8, 0, true), diffuse({0.7f, 0.2f, 0.4f}));
-  Mesh& sound = scene.meshes[0];
-  sound.uvs.assign(2 * sound.vertex_count(), 0.5f);
-  PathTracer tracer(context, scene);
-  const Image picture = tracer.render(kCamera);
-  for (const float bad :
-       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
-    for (std::vector<float> Mesh::*const numbers : {&Mesh::positions, &Mesh::normals, &Mesh::uvs}) {
-      Scene broken = scene;
-      (broken.meshes[0].*numbers).at(4) = bad;
-      CHECK_THROWS_AS(PathTracer(context, broken), DataError);
-      CHECK_THROWS_AS(tracer.set_meshes(broken.meshes), DataError);
-    }
-  }
-  CHECK(tracer.render(kCamera).data == picture.data);
-}
-
-TEST_CASE("an environment that is not finite is refused, and so is a camera that scales") {
-  Context context = make_test_context();
-  const Scene sound = cloud_scene(2);
-  for (const float value :
-       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
-    Scene scene = sound;
-    scene.environment.rotation = value;
-    CHECK_THROWS_AS(PathTracer(context, scene), UsageError);
-    scene = sound;
-    scene.environment.up[1] = value;
-    CHECK_THROWS_AS(PathTracer(context, scene), UsageError);
-  }
-  PathTracer tracer(context, sound);
-  Camera camera = kCamera;
-  camera.rotation *= 2.0;
-  CHECK_THROWS_AS(tracer.render(camera), UsageError);
 }
 
 TEST_CASE("other cameras and sizes of picture") {

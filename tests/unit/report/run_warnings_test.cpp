@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the report of a run warns of.
+#include <doctest/doctest.h>
+#include <fmt/format.h>
+
+#include <string>
+#include <utility>
+
+#include "report/run_report.hpp"
+#include "unit/report/written_run.hpp"
+#include "unit/text.hpp"
+
+using namespace raysplats;
+using test::contains;
+using test::Run;
+
+TEST_CASE("the end of a run is compared with evaluations of as many views") {
+  const Run run;
+  const auto page_of = [&](const std::string& evaluations) {
+    run.write("metrics.json",
+              R"({"complete":true,"psnr_rise":null,"seed":18446744073709551615,"evaluations":[)" +
+                  evaluations + "]}");
+    return run_report(run.path());
+  };
+  // The two views of --eval-views 2 are easier than the nine of the end.
+  const std::string easy = R"({"iteration":100,"psnr":25,"views":2},)";
+  const std::string page = page_of(easy + R"({"iteration":200,"psnr":21,"views":9})");
+  CHECK(!contains(page, "below its best"));
+  CHECK(contains(page, "Complete: 21.0 dB on 9 held-out views, nothing to warn of."));
+  CHECK(contains(page, "<td>18446744073709551615</td>"));
+  CHECK(contains(page_of(easy + R"({"iteration":150,"psnr":22,"views":9},
+                              {"iteration":200,"psnr":21.5,"views":9})"),
+                 "ends 0.50 dB below its best, at iteration 150"));
+}
+
+TEST_CASE("views that stand out, a full model and blurred photos are warned of") {
+  const Run run;
+  CHECK(!contains(run_report(run.path()), "far worse"));  // three views tell nothing
+  std::string images;
+  for (int i = 0; i < 12; ++i) {
+    images += i == 0 ? "" : ",";
+    images += R"({"name":")" + std::to_string(i) + R"(_.png","psnr":)" +
+              std::to_string(i == 3 ? 12 : 20 + i % 5) + R"(,"sharpness":)" +
+              std::to_string(i == 7 ? 0.001 : 0.05 + 0.01 * (i % 3)) + "}";
+  }
+  run.write("eval/iteration_200/metrics.json", R"({"images":[)" + images + "]}");
+  run.write("metrics.json", R"({"complete":true,"gaussians":140,"most_gaussians":141,
+    "evaluations":[{"iteration":200,"psnr":20}]})");
+  const std::string page = run_report(run.path());
+  CHECK(contains(page, "whose pose or photo may be wrong: 3_.png."));
+  CHECK(contains(page, "Held-out photos less sharp than the others: 7_.png."));
+  CHECK(!contains(page, "Training photos"));
+  CHECK(contains(page, "<td>140, at most 141</td>"));
+  CHECK(!contains(page, "stopped at its limit"));  // where the budget strategy always ends
+  run.write("config.toml", "strategy = \"adc\"\n");
+  CHECK(contains(run_report(run.path()), "stopped at its limit of 141"));
+  // The same of photos to train with, which metrics.json itself has.
+  const std::string settled = R"({"complete":true,"iteration":300,"photos":[)";
+  run.write("metrics.json", settled + images + "]}");
+  const std::string trained = run_report(run.path());
+  CHECK(contains(trained,
+                 "Training photos less sharp than the others, which blur the model: 7_.png."));
+  CHECK(contains(trained, "or something in them has moved: 3_.png."));
+  // What the run has not seen at full size says nothing, and is no odd one.
+  std::string seen = images;
+  for (int i = 0; i < 6; ++i) seen += R"(,{"name":"unseen.png","sharpness":0.05})";
+  run.write("metrics.json", settled + seen + "]}");
+  CHECK(contains(run_report(run.path()), "or something in them has moved: 3_.png."));
+  // At the border of a capture the photos beside it are as far off.
+  std::string border = seen;
+  for (const char* psnr : {"12.5", "13"})
+    border += R"(,{"name":"beside.png","sharpness":0.05,"psnr":)" + std::string(psnr) +
+              R"(,"center":[9,0,0]})";
+  border += R"(,{"name":"corner.png","sharpness":0.05,"psnr":11,"center":[9,0,0]})";
+  run.write("metrics.json", settled + border + "]}");
+  const std::string corner = run_report(run.path());
+  CHECK(!contains(corner, "corner.png"));
+  CHECK(contains(corner, "or something in them has moved: 3_.png."));
+}
+
+TEST_CASE("a run that has seen its photos a few times warns of those alone that stand out far") {
+  const Run run;
+  const auto is_odd = [&](double psnr, int iterations, int photos = 20) {
+    std::string list;
+    for (int i = 0; i < photos; ++i)
+      list += fmt::format(R"({}{{"name":"{}.png","psnr":{}}})", i > 0 ? "," : "", i,
+                          i == 3 ? psnr : 25 + i % 5);
+    run.write("metrics.json",
+              fmt::format(R"({{"complete":true,"iteration":{},"photos":[{}]}})", iterations, list));
+    return contains(run_report(run.path()), "or something in them has moved: 3.png.");
+  };
+  CHECK(is_odd(20, 200));
+  CHECK_FALSE(is_odd(20, 199));
+  CHECK(is_odd(10, 100));
+  // Of many photos few steps for each make a model.
+  CHECK(is_odd(20, 3000, 400));
+  CHECK_FALSE(is_odd(20, 2999, 400));
+  run.write("config.toml", "views-per-step = 2\n");
+  CHECK(is_odd(20, 100));
+}
+
+TEST_CASE("a run whose held-out photos differ from the model by their colours names --exposure") {
+  const Run run;
+  const std::string advice =
+      "Held-out photos are 2.1 dB nearer to the model once their colours are fitted, as where "
+      "exposure or white balance changes between photos: try --exposure.";
+  const auto page_of = [&](double psnr, double corrected, int iteration = 300) {
+    run.write("metrics.json", fmt::format(R"({{"complete":true,"iteration":{0},"evaluations":[
+      {{"iteration":{0},"psnr":{1},"psnr_corrected":{2},"views":7}}]}})",
+                                          iteration, psnr, corrected));
+    return run_report(run.path());
+  };
+  run.write("config.toml", "exposure = false\n");
+  CHECK(contains(page_of(24.66, 26.8), advice));
+  for (const auto& [psnr, corrected] :
+       {std::pair(25.2, 26.21), std::pair(39.5, 42.7), std::pair(14.2, 17.3), std::pair(16.2, 19.3),
+        std::pair(24.66, 0.0)}) {
+    CAPTURE(psnr);  // a usual capture, a dark one, models that fail, a run of an older version
+    CHECK(!contains(page_of(psnr, corrected), "--exposure"));
+  }
+  CHECK(!contains(page_of(24.66, 26.8, 90), "--exposure"));
+  run.write("config.toml", "exposure = true\n");
+  CHECK(!contains(page_of(24.66, 26.8), "try --exposure"));
+}
