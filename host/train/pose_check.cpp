@@ -82,6 +82,7 @@ void check_poses(const Dataset& dataset,
                  std::span<const SmallPhoto> photos,
                  double agreed,
                  std::uint64_t seed) {
+  spdlog::debug("{:.1f} % of what photos show agrees in one depth", 100 * agreed);
   // The axes of LLFF's files are others.
   if (dataset.kind == DatasetKind::kLlff) return;
   const auto better = better_reading(photos, agreed, seed);

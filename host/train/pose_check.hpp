@@ -31,7 +31,7 @@ struct BetterReading {
 
 /// Looks for a reading of the poses in which photos agree in one depth at least at an eighth of
 /// what they show, and at 2.5 times as much as as they are (`agreed`). Nothing where there is none,
-/// which is so of all captures with sound poses, and where so much agrees already.
+/// as with sound poses, and where so much agrees already.
 std::optional<BetterReading> better_reading(std::span<const SmallPhoto> photos,
                                             double agreed,
                                             std::uint64_t seed);

@@ -104,10 +104,10 @@ class Trainer {
   RunEstimate fit_time(double seconds, bool show_progress = false);
 
   /// Trains up to options.iterations, or end_iteration. SIGINT, SIGTERM, SIGHUP and, where it would
-  /// end the process, SIGPIPE finish the iteration, break off an evaluation, which the
-  /// run that goes on makes up for, save a checkpoint and the model and throw Error(kInterrupted).
-  /// Ten steps in a row that are not finite (StepGuard) leave RUN/dump and throw Error(kRuntime)
-  /// naming the iteration.
+  /// end the process, SIGPIPE finish the iteration, break off an evaluation, which the run that
+  /// goes on makes up for, save a checkpoint and the model and throw Error(kInterrupted). Ten steps
+  /// in a row that are not finite (StepGuard) leave RUN/dump and throw Error(kRuntime) naming the
+  /// iteration.
   /// After other failures, and after an exception from a callback, the last whole state is saved
   /// when the device still gives it, and the error says which iteration that is; what a callback
   /// throws comes out as it is. Throws DataError when another run has the folder.

@@ -1,13 +1,18 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A data set (transforms_train.json, as of `raysplats generate`) with training photos made worse, for
-docs/training.md (poses) and docs/experiments.md (box):
+"""A data set (transforms_train.json, as of `raysplats generate`, or transforms.json) with training photos made worse, for
+docs/training.md (all others) and docs/experiments.md (box):
 
 poses  every camera turned by 0.5 degrees and moved by 1 % of the extent (1.1 times the largest distance of a camera from
        their mean) in directions drawn at random, less the motion and the scale that all have in common
 box    a grey box of a quarter of the width, at another place in each, painted into every third photo
+opencv, inverse, inverse-opencv
+       poses as other programs write them: with OpenCV's camera axes, from the world to the camera, or both
+darker all photos times 0.7, those held out too
+gains  the same, and each of those to train with times 0.7 to 1.4 as well
+holes  a transparent ellipse, of 28 x 40 % of the photo, at another place in each
 
-usage: scripts/quality/disturb.py poses|box DATA OUT        (OUT is made anew; box needs Pillow)"""
+usage: scripts/quality/disturb.py KIND DATA OUT        (OUT is made anew; what changes photos needs Pillow)"""
 import json
 import pathlib
 import shutil
@@ -17,6 +22,8 @@ import numpy as np
 
 ANGLE, SHIFT = np.radians(0.5), 0.01
 EVERY, PART = 3, 0.25
+DARKER, GAINS = 0.7, (0.7, 1.4)
+HOLE = (0.14, 0.2)
 SEED = 17
 
 
@@ -63,13 +70,64 @@ def disturb_poses(folder, frames):
         frame["transform_matrix"] = matrix.tolist()
 
 
+def write_otherwise(opencv, inverse):
+    def change(folder, frames):
+        for frame in frames:
+            matrix = np.array(frame["transform_matrix"], float)
+            if opencv:
+                matrix = matrix @ np.diag([1, -1, -1, 1])
+            frame["transform_matrix"] = (np.linalg.inv(matrix) if inverse else matrix).tolist()
+    return change
+
+
+def photo_of(folder, frame):
+    path = folder / frame["file_path"]
+    return path if path.suffix else path.with_suffix(".png")
+
+
+def expose(path, gain):
+    from PIL import Image
+
+    with Image.open(path) as photo:
+        pixels = np.array(photo).astype(float)
+    pixels[..., :3] = np.clip(gain * pixels[..., :3], 0, 255)
+    Image.fromarray(np.round(pixels).astype(np.uint8)).save(path)
+
+
+def darken(gains):
+    def change(folder, frames):
+        rng = np.random.default_rng(SEED)
+        for frame in frames:
+            expose(photo_of(folder, frame), DARKER * rng.uniform(*gains))
+        held_out = folder / "transforms_test.json"
+        for frame in json.loads(held_out.read_text())["frames"] if held_out.exists() else []:
+            expose(photo_of(folder, frame), DARKER)
+    return change
+
+
+def cut_holes(folder, frames):
+    from PIL import Image
+
+    rng = np.random.default_rng(SEED)
+    for frame in frames:
+        path = photo_of(folder, frame)
+        with Image.open(path) as photo:
+            pixels = np.array(photo.convert("RGBA"))
+        height, width = pixels.shape[:2]
+        y, x = np.mgrid[0:height, 0:width]
+        u, v = (x / width - rng.uniform(0.2, 0.8)) / HOLE[0], (y / height - rng.uniform(0.3, 0.8)) / HOLE[1]
+        pixels[u * u + v * v < 1, 3] = 0
+        path.unlink()
+        frame["file_path"] = str(pathlib.Path(frame["file_path"]).with_suffix(".png"))
+        Image.fromarray(pixels).save(path.with_suffix(".png"))
+
+
 def paint_boxes(folder, frames):
     from PIL import Image, ImageDraw
 
     rng = np.random.default_rng(SEED)
     for frame in frames[::EVERY]:
-        path = folder / frame["file_path"]
-        path = path if path.suffix else path.with_suffix(".png")
+        path = photo_of(folder, frame)
         with Image.open(path) as photo:
             picture = photo.copy()
         side = int(PART * picture.width)
@@ -80,7 +138,10 @@ def paint_boxes(folder, frames):
 
 
 def main():
-    kinds = {"poses": disturb_poses, "box": paint_boxes}
+    kinds = {"poses": disturb_poses, "box": paint_boxes, "opencv": write_otherwise(True, False),
+             "inverse": write_otherwise(False, True), "inverse-opencv": write_otherwise(True, True),
+             "darker": darken((1, 1)), "gains": darken(GAINS),
+             "holes": cut_holes}
     if len(sys.argv) != 4 or sys.argv[1] not in kinds:
         sys.exit(__doc__)
     source, folder = map(pathlib.Path, sys.argv[2:])
@@ -89,6 +150,7 @@ def main():
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(source, folder)
     path = folder / "transforms_train.json"
+    path = path if path.exists() else folder / "transforms.json"
     transforms = json.loads(path.read_text())
     kinds[sys.argv[1]](folder, transforms["frames"])
     path.write_text(json.dumps(transforms))

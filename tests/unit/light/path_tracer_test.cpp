@@ -8,7 +8,6 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
-#include <limits>
 #include <stdexcept>
 #include <thread>
 #include <vector>

@@ -22,7 +22,6 @@
 #include "report/html.hpp"
 #include "report/run_report.hpp"
 #include "unit/report/written_run.hpp"
-#include "unit/temporary_directory.hpp"
 #include "unit/text.hpp"
 
 using namespace raysplats;

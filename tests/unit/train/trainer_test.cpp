@@ -74,6 +74,16 @@ std::vector<std::string> lines_of(const std::filesystem::path& path) {
   return lines;
 }
 
+// Whether a signal ends the run.
+bool is_interrupted(Trainer& trainer) {
+  try {
+    trainer.run(false);
+  } catch (const Error& error) {
+    return error.code() == ErrorCode::kInterrupted;
+  }
+  return false;
+}
+
 }  // namespace
 
 TEST_CASE("a resumed run ends with the bytes of an uninterrupted one") {
@@ -303,13 +313,7 @@ TEST_CASE("a signal ends the run with everything saved") {
     if (!token.stop_requested()) std::raise(SIGTERM);
   });
   Trainer trainer(photos.context, photos.dataset, options, folder);
-  bool interrupted = false;
-  try {
-    trainer.run(false);
-  } catch (const Error& error) {
-    interrupted = error.code() == ErrorCode::kInterrupted;
-  }
-  CHECK(interrupted);
+  CHECK(is_interrupted(trainer));
   const std::int64_t done = trainer.iteration();
   CHECK(load_latest_checkpoint(folder).iteration == done);
   CHECK(std::filesystem::exists(folder / "point_cloud" / ("iteration_" + std::to_string(done)) /
@@ -329,13 +333,7 @@ TEST_CASE("a signal breaks off the last evaluation, which the resumed run makes 
     trainer.on_step([&](const TrainProgress& progress) {
       if (progress.iteration == progress.iterations) std::raise(SIGTERM);
     });
-    bool interrupted = false;
-    try {
-      trainer.run(false);
-    } catch (const Error& error) {
-      interrupted = error.code() == ErrorCode::kInterrupted;
-    }
-    CHECK(interrupted);
+    CHECK(is_interrupted(trainer));
     CHECK(trainer.iteration() == options.iterations);
   }
   CHECK_FALSE(is_complete());
