@@ -32,7 +32,7 @@ if [[ ${1:-} == -* ]]; then
   exit 2
 fi
 output=$(realpath -m -- "${1:-$root/gallery}")
-run=${2:-}
+run=${2:+$(realpath -- "$2")}
 cd "$root"
 raysplats=$root/build/release/bin/raysplats
 [[ -x $raysplats ]] || ./scripts/setup.sh

@@ -5,8 +5,9 @@
 # Installs Debian's libopenmpi-dev and openmpi-bin when they are missing and root may. Ends with 77 and a line "SKIPPED
 # why" where they cannot be had.
 set -euo pipefail
-cd "$(dirname "${BASH_SOURCE[0]}")/.."
-build=${1:-build/release}
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+build=$(realpath -m -- "${1:-$root/build/release}")
+cd "$root"
 
 skip() {
   echo "SKIPPED $*"

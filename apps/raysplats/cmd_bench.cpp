@@ -23,6 +23,7 @@
 #include "run/model_source.hpp"
 #include "synth/bench_scenes.hpp"
 #include "util/atomic_file.hpp"
+#include "util/file_kind.hpp"
 #include "util/number_text.hpp"
 #include "validators.hpp"
 #include "value_text.hpp"
@@ -73,7 +74,7 @@ Camera resized(Camera camera, int width, int height) {
 }
 
 std::vector<Camera> read_views(const std::string& path) {
-  if (!std::filesystem::is_directory(path)) return read_cameras(path);
+  if (!is_folder(path)) return read_cameras(path);
   return cameras_of(load_dataset(path), Split::kAll);
 }
 

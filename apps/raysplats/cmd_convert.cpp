@@ -20,6 +20,7 @@
 #include "run/model_source.hpp"
 #include "run/run_cameras.hpp"
 #include "util/atomic_file.hpp"
+#include "util/interrupt.hpp"
 #include "util/number_text.hpp"
 #include "validators.hpp"
 #include "value_text.hpp"
@@ -102,6 +103,8 @@ void run(Options& options) {
   } else if (!options.data.empty()) {
     throw UsageError("--data has the views that --max-gaussians goes by: give that as well");
   }
+  // A file that is begun is completed, or removed.
+  const InterruptGuard interrupt;
   const Conversion done =
       convert_model(source.file, options.output, changes, encoding, trace, options.overwrite);
   const std::string left = done.written == done.read ? "" : fmt::format(" of {}", done.read);

@@ -56,7 +56,9 @@ void run(const Options& options) {
   if (options.json) {
     nlohmann::ordered_json list = nlohmann::ordered_json::array();
     for (const DeviceInfo& device : devices) list.push_back(device_json(device));
-    fmt::print("{}\n", nlohmann::ordered_json{{"devices", list}}.dump(2));
+    // Drivers call devices by any bytes.
+    using Json = nlohmann::ordered_json;
+    fmt::print("{}\n", Json{{"devices", list}}.dump(2, ' ', false, Json::error_handler_t::replace));
   } else {
     for (const DeviceInfo& device : devices) print(device);
   }

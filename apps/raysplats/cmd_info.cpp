@@ -23,6 +23,7 @@
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "run/model_source.hpp"
+#include "util/file_kind.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -57,12 +58,12 @@ void check_known(const std::filesystem::path& file) {
 
 void run(const Options& options) {
   const std::filesystem::path path = options.path;
-  if (!std::filesystem::exists(path)) {
+  if (!is_there(path)) {
     throw DataError(
         fmt::format("{} does not exist: name a model, a mesh, a scene file, a data set or a run",
                     path.string()));
   }
-  const bool folder = std::filesystem::is_directory(path);
+  const bool folder = is_folder(path);
   std::optional<Json> other;
   if (!folder) {
     other = describe_file(path);

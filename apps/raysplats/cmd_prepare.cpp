@@ -15,6 +15,7 @@
 #include "util/interrupt.hpp"
 #include "util/number_text.hpp"
 #include "util/progress.hpp"
+#include "util/shell_word.hpp"
 #include "validators.hpp"
 
 namespace raysplats::cli {
@@ -81,7 +82,7 @@ void run(Options& options, const GlobalOptions& global) {
   }
   fmt::print("{} of {} photos with poses and {} in {}; next: raysplats train {} -o RUN\n",
              made.photos - made.without_pose.size(), made.photos, counted(made.points, "point"),
-             options.output, options.output);
+             options.output, shell_word(options.output));
 }
 
 }  // namespace

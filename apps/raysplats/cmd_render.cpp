@@ -218,12 +218,12 @@ void render_model(const RenderFlags& options, const GlobalOptions& global) {
   share_work(options.device, global, [&](Communicator& ranks, Context& context) {
     const Model on_device(context, model);
     Tracer tracer(context, trace, mirrors_of(source));
+    FrameProgress progress("rendering", cameras.size(), ranks, global.quiet);
+    output.begin(ranks);
     const FrameOptions share = share_of(ranks, output.options(), cameras.size());
-    output.begin();
     spdlog::info("{} Gaussians of {}, {} views", model.size(), source.file.string(),
                  cameras.size());
 
-    FrameProgress progress("rendering", cameras.size(), ranks, global.quiet);
     FrameReport report = write_frames(
         tracer, on_device, cameras, options.output, share,
         [&](std::size_t done) { return progress.done(done); },

@@ -16,6 +16,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/trainer.hpp"
 #include "render/output_check.hpp"
+#include "report/run_files.hpp"
 #include "report/run_report.hpp"
 #include "run/checkpoint.hpp"
 #include "run/mirror_meshes.hpp"
@@ -24,6 +25,7 @@
 #include "train/quality_preset.hpp"
 #include "util/number_text.hpp"
 #include "util/progress.hpp"
+#include "util/shell_word.hpp"
 #include "validators.hpp"
 #include "value_text.hpp"
 #include "view/photos.hpp"
@@ -162,10 +164,10 @@ std::unique_ptr<view::RunView> show(Context& context,
   cameras.reserve(views.size());
   for (const View& each : views) cameras.push_back(each.camera);
   view::ViewState state = view::first_look(view::extent_before(cameras), cameras, std::nullopt);
-  state.name = std::filesystem::path(options.output).filename().string();
+  state.name = report::run_name(options.output);
   state.origin = {origin[0], origin[1], origin[2]};
   state.about = fmt::format("in training on {} of {}", counted(cameras.size(), "photo"),
-                            std::filesystem::path(options.data).filename().string());
+                            report::run_name(options.data));
   state.has_near = state.has_depth = mirrors.meshes.empty();
   state.near_depth = options.train.trace.near_depth;
   state.trains = state.has_order = state.has_photos = true;
@@ -190,7 +192,7 @@ void report(const std::filesystem::path& folder, const char* state) {
     if (!warnings.empty()) fmt::print("{}\n", warnings);
   } catch (const std::exception& error) {
     spdlog::warn("the run is {}, but has no report: {}; try again by 'raysplats report {}'", state,
-                 error.what(), folder.string());
+                 error.what(), shell_word(folder.string()));
   }
 }
 
@@ -255,7 +257,8 @@ void train(const CLI::App& command,
   if (!ranks.leads()) return;
 
   print_results(summary, options.output);
-  if (shown) shown->finish(fmt::format("The run has ended: raysplats view {}", options.output));
+  if (shown)
+    shown->finish(fmt::format("The run has ended: raysplats view {}", shell_word(options.output)));
   if (!options.device.profile) return;
   fmt::print("{}{}", context.profile_table(),
              traffic_of(ranks, before, summary.iterations - begun, "step"));

@@ -34,6 +34,8 @@ void run(const Options& options) {
   TuningStore store;
   if (options.reset) {
     if (options.dry_run) throw UsageError("--reset measures nothing: leave out --dry-run");
+    if (store.path().empty())
+      throw DataError("There is no folder of tunings: set HOME or XDG_CACHE_HOME");
     const std::size_t removed = store.remove(device);
     fmt::print("{} tuning of {} removed from {}\n", removed, device.name, store.path().string());
     return;

@@ -6,26 +6,62 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
+#include <limits>
+#include <span>
 #include <utility>
 
 #include "raysplats/train_options.hpp"
 #include "run/train_option_table.hpp"
 #include "util/nearest_name.hpp"
 #include "util/number_text.hpp"
+#include "util/shell_word.hpp"
 
 namespace raysplats::cli {
 namespace {
 
-/// Whether an option takes a list of numbers, which shells cut into words at its spaces.
-bool takes_numbers(std::string_view name) {
-  if (name == "--background" || name == "--up" || name == "--sizes" || name == "--crop")
-    return true;
+constexpr std::size_t kAnyNumber = std::numeric_limits<std::size_t>::max();
+
+/// How many numbers the list of an option has at most, which shells cut into words at its spaces; 0
+/// for options that take no list.
+std::size_t most_numbers(std::string_view name) {
+  if (name == "--background" || name == "--up") return 3;
+  if (name == "--crop" || name == "--bounds") return 6;
+  if (name == "--sizes") return kAnyNumber;
   TrainOptions options;
   const std::vector<OptionRow> keys = train_option_rows(options);
-  return name.starts_with("--") && std::any_of(keys.begin(), keys.end(), [&](const OptionRow& key) {
-           return key.list == OptionRow::List::kNumbers && key.name == name.substr(2);
-         });
+  const bool list =
+      name.starts_with("--") && std::any_of(keys.begin(), keys.end(), [&](const OptionRow& key) {
+        return key.list == OptionRow::List::kNumbers && key.name == name.substr(2);
+      });
+  return list ? kAnyNumber : 0;
+}
+
+std::size_t count_numbers(std::string_view text) {
+  constexpr std::string_view kBetween = "[],= ";
+  std::size_t count = 0;
+  for (std::size_t at = 0; (at = text.find_first_not_of(kBetween, at)) != std::string_view::npos;
+       ++count) {
+    at = std::min(text.find_first_of(kBetween, at), text.size());
+  }
+  return count;
+}
+
+/// How many of `words`, which follow an option, belong to its list, of which the option's own word
+/// has `begun`. What follows a list that is full is no part of it.
+std::size_t list_words(std::string_view option,
+                       std::size_t begun,
+                       std::span<const char* const> words) {
+  const std::size_t most = most_numbers(option);
+  std::size_t count = begun;
+  std::size_t taken = 0;
+  for (; most > 0 && taken < words.size() && is_number_list_part(words[taken]); ++taken) {
+    const std::size_t more = count_numbers(words[taken]);
+    if (more > 0 && count >= most) break;
+    count += more;
+  }
+  // One number is a grey, and two are no colour.
+  if (option == "--background" && count < most) taken = std::min<std::size_t>(taken, begun == 0);
+  return taken;
 }
 
 std::vector<std::string> option_names(const CLI::App& app) {
@@ -46,24 +82,27 @@ std::vector<std::string> command_names(const CLI::App& app) {
   return names;
 }
 
-}  // namespace
-
-std::string shell_quoted(std::string_view text) {
-  std::string out = "'";
-  for (const char c : text) out += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return out + "'";
+/// Where a list of any length may have taken the file or folder that is missing: says so.
+std::string taken_as_number(const CLI::App& command, const CLI::ParseError& error) {
+  if (error.get_name() != "RequiredError" || std::string_view(error.what()).starts_with("--"))
+    return "";
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& words : option->results()) {
+      const std::size_t space = words.rfind(' ');
+      const std::string name = option->get_name();
+      if (space == std::string::npos || most_numbers(name) != kAnyNumber) continue;
+      return fmt::format("; {1} is taken for a number of {0}: write ./{1} for a file or folder",
+                         name, words.substr(space + 1));
+    }
+  }
+  return "";
 }
+
+}  // namespace
 
 std::string command_line(int argc, const char* const* argv) {
   std::string line = "raysplats";
-  for (int i = 1; i < argc; ++i) {
-    const std::string_view word = argv[i];
-    const bool plain = !word.empty() && std::all_of(word.begin(), word.end(), [](unsigned char c) {
-      return std::isalnum(c) != 0 ||
-             std::string_view("-_=./:,+@%").find(static_cast<char>(c)) != std::string_view::npos;
-    });
-    line += fmt::format(" {}", plain ? std::string(word) : shell_quoted(word));
-  }
+  for (int i = 1; i < argc; ++i) line += " " + shell_word(argv[i]);
   return line;
 }
 
@@ -85,12 +124,11 @@ std::vector<std::string> own_arguments(int argc, const char* const* argv) {
       break;
     }
     // One word for a list, so that what follows it is no part of it: --save-at 5 10 DATA.
-    const std::size_t mark = word.find('=');
-    if (takes_numbers(std::string_view(word).substr(0, mark))) {
-      for (; i + 1 < argc && is_number_list_part(argv[i + 1]); ++i) {
-        word += word.find('=') == std::string::npos ? '=' : ' ';
-        word += argv[i + 1];
-      }
+    const std::string option = word.substr(0, word.find('='));
+    const std::size_t begun = count_numbers(std::string_view(word).substr(option.size()));
+    for (auto left = list_words(option, begun, {argv + i + 1, argv + argc}); left > 0; --left) {
+      word += word.find('=') == std::string::npos ? '=' : ' ';
+      word += argv[++i];
     }
     arguments.push_back(std::move(word));
   }
@@ -122,7 +160,8 @@ std::string explain(const CLI::ParseError& error, const CLI::App& app) {
     return fmt::format("No command given: use one of {}; 'raysplats -h' explains them",
                        fmt::join(command_names(app), ", "));
   }
-  return fmt::format("{} ('{}' explains the options)", error.what(), help);
+  return fmt::format("{}{} ('{}' explains the options)", error.what(),
+                     taken_as_number(command, error), help);
 }
 
 }  // namespace raysplats::cli

@@ -3,13 +3,10 @@
 
 #include <CLI/CLI.hpp>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace raysplats::cli {
 
-/// In single quotes, within which a shell takes everything as it is but these.
-std::string shell_quoted(std::string_view text);
 /// The program and its arguments as a shell takes them.
 std::string command_line(int argc, const char* const* argv);
 /// The arguments without the program's name; names that other trainers use for the same become

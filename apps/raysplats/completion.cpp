@@ -9,7 +9,7 @@
 #include <functional>
 #include <string_view>
 
-#include "command_line.hpp"
+#include "util/shell_word.hpp"
 
 namespace raysplats::cli {
 namespace {

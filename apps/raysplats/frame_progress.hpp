@@ -51,7 +51,7 @@ class FrameProgress {
 
  private:
   std::size_t total_;
-  InterruptGuard interrupt_;
+  InterruptGuard interrupt_{LostReader::kInterrupts};
   Progress progress_;
   std::size_t frames_ = 0;
 };

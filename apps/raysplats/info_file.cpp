@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <map>
 #include <string>
@@ -65,9 +66,11 @@ std::optional<Json> describe_curves(const std::filesystem::path& path) {
   const auto iterations = columns.find("iteration");
   if (iterations == columns.end()) return std::nullopt;
   const std::vector<double>& rows = iterations->second;
+  constexpr double kExact = 9007199254740992.0;  // 2^53, beyond any run
+  const double last = rows.empty() ? 0.0 : std::clamp(rows.back(), 0.0, kExact);
   Json out{{"type", "course of a run"},
            {"rows", rows.size()},
-           {"iterations", rows.empty() ? 0.0 : rows.back()}};
+           {"iterations", static_cast<std::int64_t>(last)}};
   for (const auto& [name, values] : columns) out["columns"].push_back(name);
   return out;
 }
@@ -123,10 +126,13 @@ std::optional<Json> describe_toml(const std::filesystem::path& path) {
     if (table.contains(part)) return std::nullopt;
   TrainOptions options;
   read_train_config(path, options);
-  const auto* nested = table["train"].as_table();
   std::vector<std::string> given;
-  for (const auto& [key, value] : nested != nullptr ? *nested : table)
-    given.emplace_back(key.str());
+  for (const auto& [key, value] : table) {
+    if (!value.is_table()) given.emplace_back(key.str());
+  }
+  if (const toml::table* nested = table["train"].as_table(); nested != nullptr) {
+    for (const auto& [key, value] : *nested) given.emplace_back(key.str());
+  }
   Json about{{"type", "configuration"}};
   if (options.iterations != kFittedLength) about["iterations"] = options.iterations;
   about["given"] = given;

@@ -71,7 +71,7 @@ std::optional<Json> describe_points(const fs::path& path) {
   const bool gaussians =
       std::any_of(kOfGaussians.begin(), kOfGaussians.end(),
                   [&](std::string_view name) { return file.column(name).has_value(); });
-  if (gaussians || file.has_later("face") || !file.column("x")) return std::nullopt;
+  if (gaussians || file.later_rows("face") > 0 || !file.column("x")) return std::nullopt;
   const io::PlyPoints points = io::read_ply_points(path);
   return Json{{"type", "points"},
               {"points", points.cloud.size()},

@@ -108,7 +108,7 @@ std::string named_kinds(const Json& materials) {
 bool is_mesh_ply(const std::filesystem::path& path) {
   const io::PlyFile file(path);
   constexpr std::array<std::string_view, 2> kCorners{"vertex_indices", "vertex_index"};
-  return !file.column("opacity") &&
+  return !file.column("opacity") && file.later_rows("face") > 0 &&
          file.for_each_list("face", kCorners, [](std::size_t, std::span<const double>) {});
 }
 

@@ -70,12 +70,20 @@ RenderOutput::RenderOutput(const RenderFlags& flags,
                       frames, *flags.seconds, rate, kLeastFps, kMostFps));
     }
   }
-  video_ = open_video(flags.video, {rate, frames});
-  options_.video = video_.get();
+  pace_ = {rate, frames};
+  open_video(flags.video, pace_);  // which refuses what cannot be written
 }
 
-void RenderOutput::begin() const {
+void RenderOutput::begin(const Communicator& ranks) {
+  if (ranks.size() > 1 && !flags_.video.empty()) {
+    throw UsageError(
+        "--video is written by one rank, frame after frame: leave out mpirun and the list of "
+        "--device, or write the frames alone");
+  }
   if (options_.files) make_output_directory(flags_.output);
+  if (flags_.video.empty()) return;
+  video_ = open_video(flags_.video, pace_);
+  options_.video = video_.get();
 }
 
 void RenderOutput::finish() {

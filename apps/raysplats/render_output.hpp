@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 
+#include "comm/communicator.hpp"
 #include "io/camera_path_file.hpp"
 #include "render_flags.hpp"
 
@@ -27,8 +28,10 @@ class RenderOutput {
                bool closed);
 
   const FrameOptions& options() const { return options_; }
-  /// Makes the folder.
-  void begin() const;
+  /// Makes the folder and begins the video. Throws UsageError for a video that several ranks would
+  /// write. Whoever calls it holds an InterruptGuard: a file that is begun is left behind where a
+  /// signal ends the process.
+  void begin(const Communicator& ranks);
   /// Completes the video.
   void finish();
   /// "DIR", "VIDEO" or "DIR and VIDEO".
@@ -39,6 +42,7 @@ class RenderOutput {
  private:
   const RenderFlags& flags_;
   FrameOptions options_;
+  VideoOptions pace_;
   std::unique_ptr<VideoFile> video_;
 };
 

@@ -197,11 +197,11 @@ void render_scene(const RenderFlags& flags, const GlobalOptions& global) {
   share_work(flags.device, global,
              [&, first = first, last = last](Communicator& ranks, Context& context) {
                PathTracer tracer(context, loaded.scene);
+               FrameProgress progress("rendering", last - first, ranks, global.quiet);
+               output.begin(ranks);
                const FrameOptions share = share_of(ranks, output.options(), last - first);
-               output.begin();
                spdlog::info("{}: {}", flags.model, contents(loaded.scene, last - first));
 
-               FrameProgress progress("rendering", last - first, ranks, global.quiet);
                SceneReport report = write_scene_frames(
                    tracer, loaded, first, last, flags.output, share,
                    [&](std::size_t done) { return progress.done(done); },

@@ -73,11 +73,6 @@ void share_work(const DeviceFlags& flags,
 }
 
 FrameOptions share_of(Communicator& ranks, FrameOptions options, std::size_t frames) {
-  if (ranks.size() > 1 && options.video != nullptr) {
-    throw UsageError(
-        "--video is written by one rank, frame after frame: leave out mpirun and the list of "
-        "--device, or write the frames alone");
-  }
   if (frames < static_cast<std::size_t>(ranks.size())) {
     options.bands = &ranks;
     return options;

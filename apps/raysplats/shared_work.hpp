@@ -26,8 +26,7 @@ void share_work(const DeviceFlags& flags,
                 const std::function<void(Communicator&, Context&)>& work);
 
 /// The same options for what a rank draws of `frames` frames: some of them, or where there
-/// are fewer than ranks, its rows of all. Throws UsageError for a video that several ranks
-/// would write.
+/// are fewer than ranks, its rows of all.
 FrameOptions share_of(Communicator& ranks, FrameOptions options, std::size_t frames);
 
 /// All ranks: the sum and the largest of a number of each.

@@ -230,7 +230,7 @@ std::string diagnosis_json(const Diagnosis& diagnosis) {
                  {"devices", devices},
                  {"works", diagnosis.any_works()},
                  {"advice", diagnosis.advice}};
-  return out.dump(2) + "\n";
+  return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace raysplats

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "bench/bench_cases.hpp"
+#include "bench/larger.hpp"
 #include "bench/scene_bench.hpp"
 #include "light/view_tracer.hpp"
 #include "scene/pixel_count.hpp"
@@ -114,25 +115,6 @@ std::vector<std::string> uncompared_rows(const BenchReport& report,
   return out;
 }
 
-ResultDifference difference_of(const NamedNumbers& a, const NamedNumbers& b) {
-  ResultDifference out;
-  out.name = a.name;
-  out.numbers = a.numbers.size();
-  double largest = 0, scale = 0;
-  for (std::size_t i = 0; i < a.numbers.size(); ++i) {
-    scale = std::max(scale, std::abs(static_cast<double>(a.numbers[i])));
-    if (std::bit_cast<std::uint32_t>(a.numbers[i]) == std::bit_cast<std::uint32_t>(b.numbers[i]))
-      continue;
-    ++out.differing;
-    const double difference =
-        std::abs(static_cast<double>(a.numbers[i]) - static_cast<double>(b.numbers[i]));
-    // What is no number stays.
-    if (!(difference <= largest)) largest = difference;
-  }
-  out.largest = scale > 0 ? largest / scale : largest;
-  return out;
-}
-
 // One folder's side of the comparison of one scene.
 struct Side {
   Side(Context& context_in,
@@ -177,6 +159,24 @@ struct Side {
 
 }  // namespace
 
+ResultDifference difference_of(std::string name,
+                               std::span<const float> before,
+                               std::span<const float> after) {
+  ResultDifference out;
+  out.name = std::move(name);
+  out.numbers = before.size();
+  double largest = 0, scale = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    scale = std::max(scale, std::abs(static_cast<double>(before[i])));
+    if (std::bit_cast<std::uint32_t>(before[i]) == std::bit_cast<std::uint32_t>(after[i])) continue;
+    ++out.differing;
+    largest =
+        larger(largest, std::abs(static_cast<double>(before[i]) - static_cast<double>(after[i])));
+  }
+  out.largest = scale > 0 ? largest / scale : largest;
+  return out;
+}
+
 bool KernelComparison::equal() const {
   return std::all_of(results.begin(), results.end(),
                      [](const ResultDifference& result) { return result.differing == 0; });
@@ -203,8 +203,8 @@ KernelComparison compare_kernels(const DeviceInfo& device,
     const std::vector<NamedNumbers> a = results_of(first, model, options);
     const std::vector<NamedNumbers> b = results_of(second, model, options);
     for (std::size_t i = 0; i < a.size(); ++i) {
-      out.results.push_back(difference_of(a[i], b[i]));
-      out.results.back().name = fmt::format("{}/{}: {}", one.scene, one.size, a[i].name);
+      out.results.push_back(difference_of(fmt::format("{}/{}: {}", one.scene, one.size, a[i].name),
+                                          a[i].numbers, b[i].numbers));
     }
     Side left(first, model, options, keep), right(second, model, options, keep);
     for (int round = 0; round < options.repeat; ++round) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,11 @@ struct ResultDifference {
   std::size_t differing = 0;  ///< of them, in any bit
   double largest = 0;         ///< difference over the largest number; NaN where one is no number
 };
+
+/// Both sides' numbers of a result.
+ResultDifference difference_of(std::string name,
+                               std::span<const float> before,
+                               std::span<const float> after);
 
 struct KernelComparison {
   std::vector<ResultDifference> results;

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "bench/kept_failure.hpp"
+#include "bench/larger.hpp"
 #include "light/view_tracer.hpp"
 #include "reference/gradients.hpp"
 #include "reference/scenes.hpp"
@@ -77,8 +78,7 @@ void check_way(Context& context,
       const double difference = std::abs(static_cast<double>(image.data[4 * i + c]) -
                                          expected.render.image[c * pixels + i]);
       mean += difference / static_cast<double>(4 * pixels);
-      // Written so that what is no number stays.
-      if (expected.render.margin[i] >= kTie && !(difference <= most)) most = difference;
+      if (expected.render.margin[i] >= kTie) most = larger(most, difference);
     }
   }
   out.push_back({way + ": image, mean difference", mean, kMeanLimit});

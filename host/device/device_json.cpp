@@ -26,7 +26,8 @@ nlohmann::ordered_json device_json(const DeviceInfo& device) {
               {"packet_width", device.tuning->packet_width},
               {"tile", device.tuning->tile},
               {"pending", device.tuning->pending},
-              {"group", device.tuning->group}};
+              {"group", device.tuning->group},
+              {"bvh", device.tuning->bvh}};
   }
   return {{"index", device.index},
           {"name", device.name},

@@ -15,6 +15,7 @@
 #include <fstream>
 #include <thread>
 
+#include "raysplats/error.hpp"
 #include "util/output_directory.hpp"
 
 namespace raysplats {
@@ -152,14 +153,26 @@ void ProgramCache::remove(const std::string& key) const {
 
 namespace {
 
-std::vector<std::filesystem::path> programs_in(const std::filesystem::path& directory) {
+template <class Wanted>
+std::vector<std::filesystem::path> files_in(const std::filesystem::path& directory, Wanted wanted) {
   std::error_code error;
-  std::vector<std::filesystem::path> programs;
+  std::vector<std::filesystem::path> files;
   for (std::filesystem::directory_iterator entry(directory, error), end; !error && entry != end;
        entry.increment(error)) {
-    if (entry->path().extension() == ".bin") programs.push_back(entry->path());
+    if (wanted(entry->path())) files.push_back(entry->path());
   }
-  return programs;
+  return files;
+}
+
+std::vector<std::filesystem::path> programs_in(const std::filesystem::path& directory) {
+  return files_in(directory, [](const auto& path) { return path.extension() == ".bin"; });
+}
+
+// What mkstemp() named .NAME.XXXXXX, and a killed process has left.
+std::vector<std::filesystem::path> temporaries_in(const std::filesystem::path& directory) {
+  return files_in(directory, [](const auto& path) {
+    return path.filename().string().starts_with('.') && path.extension().string().size() == 7;
+  });
 }
 
 }  // namespace
@@ -180,11 +193,15 @@ ProgramCacheState program_cache_state(const std::filesystem::path& directory) {
 }
 
 std::size_t clear_program_cache(const std::filesystem::path& directory) {
+  if (directory.empty())
+    throw DataError("There is no folder of compiled programs: set HOME or XDG_CACHE_HOME");
   std::size_t removed = 0;
   std::error_code error;
   for (const std::filesystem::path& path : programs_in(directory)) {
     if (std::filesystem::remove(path, error)) ++removed;
   }
+  for (const std::filesystem::path& path : temporaries_in(directory))
+    std::filesystem::remove(path, error);
   return removed;
 }
 

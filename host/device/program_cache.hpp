@@ -62,8 +62,9 @@ struct ProgramCacheState {
 /// Makes the folder where it is missing, as the cache does.
 ProgramCacheState program_cache_state(const std::filesystem::path& directory);
 
-/// Removes every compiled program from `directory` and returns how many there were. Programs that
-/// other processes store meanwhile may stay.
+/// Removes every compiled program from `directory`, and what killed processes left there, and
+/// returns how many programs there were. Those that other processes store meanwhile may stay or get
+/// lost. Throws DataError without a folder.
 std::size_t clear_program_cache(const std::filesystem::path& directory);
 
 }  // namespace raysplats

@@ -28,12 +28,24 @@ constexpr std::uint64_t kMaxNumber = 1 << 20;
 
 using Entry = TuningStore::Entry;
 
+// What a driver says, as the file can hold it: what is no UTF-8 in it becomes U+FFFD.
+std::string storable(const std::string& said) {
+  using Json = nlohmann::json;
+  const std::string text = Json(said).dump(-1, ' ', false, Json::error_handler_t::replace);
+  return Json::parse(text).get<std::string>();
+}
+
+Entry entry_of(const DeviceInfo& device, const DeviceTuning& tuning) {
+  return {storable(device.name), storable(device.platform), storable(device.driver_version),
+          RAYSPLATS_VERSION, tuning};
+}
+
 bool is_device(const Entry& entry, const DeviceInfo& device) {
-  return entry.device == device.name && entry.platform == device.platform;
+  return entry.device == storable(device.name) && entry.platform == storable(device.platform);
 }
 
 bool is_current(const Entry& entry, const DeviceInfo& device) {
-  return is_device(entry, device) && entry.driver == device.driver_version &&
+  return is_device(entry, device) && entry.driver == storable(device.driver_version) &&
          entry.version == RAYSPLATS_VERSION;
 }
 
@@ -149,8 +161,7 @@ void TuningStore::store(const DeviceInfo& device, const DeviceTuning& tuning) {
   // Another process may have measured meanwhile.
   entries_ = read_entries(path_);
   std::erase_if(entries_, [&](const Entry& entry) { return is_current(entry, device); });
-  entries_.push_back(
-      {device.name, device.platform, device.driver_version, RAYSPLATS_VERSION, tuning});
+  entries_.push_back(entry_of(device, tuning));
   std::error_code error;
   std::filesystem::create_directories(path_.parent_path(), error);
   write_entries(path_, entries_);

@@ -137,10 +137,14 @@ std::vector<std::string> chosen_channels(const std::string& path,
       if (channels.findChannel(layer + name) != nullptr) names.push_back(layer + name);
     }
   };
-  if (channels.findChannel("R") != nullptr || channels.findChannel("G") != nullptr ||
-      channels.findChannel("B") != nullptr) {
+  const auto count = [&](std::initializer_list<const char*> wanted) {
+    return std::count_if(wanted.begin(), wanted.end(),
+                         [&](const char* name) { return channels.findChannel(name) != nullptr; });
+  };
+  const auto primaries = count({"R", "G", "B"});
+  if (primaries == 1 || primaries == 3) {
     take("", {"R", "G", "B", "A"});
-  } else if (channels.findChannel("Y") != nullptr) {
+  } else if (primaries == 0 && count({"Y"}) == 1 && count({"RY", "BY"}) == 0) {
     take("", {"Y", "A"});
   } else if (const std::string layer = chosen_layer(channels); !layer.empty()) {
     take(layer, {"R", "G", "B", "A"});
@@ -149,8 +153,8 @@ std::vector<std::string> chosen_channels(const std::string& path,
   const std::size_t more = all.size() - std::min(all.size(), kNamed);
   all.resize(all.size() - more);
   throw DataError(fmt::format(
-      "The image {} has the channels {}{} and none of colours among them: it must have R, G and B, "
-      "of a layer or without, or Y, or one channel alone",
+      "The image {} has the channels {}{} and no colours that are read among them: it must have R, "
+      "G and B, of a layer or without, or Y without RY and BY, or one channel alone",
       path, fmt::join(all, ", "), more > 0 ? fmt::format(" and {} more", more) : ""));
 }
 

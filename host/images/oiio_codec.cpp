@@ -6,12 +6,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "images/exr_codec.hpp"
@@ -23,9 +23,6 @@
 
 namespace raysplats::io {
 namespace {
-
-/// Of the greatest integer of 32 bits: less is no photo's brightest pixel.
-constexpr float kLeastWhite = 1.0f / 256.0f;
 
 std::string reason(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
@@ -100,33 +97,25 @@ class OiioDecoder : public ImageDecoder {
       case 2:
         return decode_as<std::uint16_t>(OIIO::TypeUInt16);
       default:
-        RawImage image = decode_as<float>(OIIO::TypeFloat);
-        require_known_white(image);
-        return image;
+        return decode_as<float>(OIIO::TypeFloat);
     }
+  }
+  double greatest_integer() const override {
+    const OIIO::TypeDesc type = input_->spec().format;
+    if (sample_bytes() < 4 || type.is_floating_point()) return 0.0;
+    return std::exp2(8 * static_cast<int>(type.basesize()) - (type.is_signed() ? 1 : 0)) - 1.0;
   }
 
  private:
-  // No file says what is white among integers of 32 bits. OpenImageIO takes the greatest that there
-  // are; beside it counts, labels and numbers of a camera, of 16 bits or less, are all black.
-  void require_known_white(const RawImage& image) const {
-    const unsigned char type = input_->spec().format.basetype;
-    const bool is_signed = type == OIIO::TypeDesc::INT32;
-    if (!is_signed && type != OIIO::TypeDesc::UINT32) return;
-    const auto channels = static_cast<std::size_t>(image.channels);
-    const std::size_t colors = channels - (channels % 2 == 0 ? 1 : 0);
-    const auto& numbers = std::get<std::vector<float>>(image.numbers);
-    float most = 0.0f;
-    for (std::size_t i = 0; i < numbers.size(); ++i) {
-      if (i % channels < colors) most = std::max(most, numbers[i]);
-    }
-    if (most == 0.0f || most >= kLeastWhite) return;
-    const double greatest = static_cast<double>(most) * (is_signed ? 2147483647.0 : 4294967295.0);
-    throw DataError(
-        fmt::format("The image {} has integers of 32 bits, of which the greatest is {:.0f}: what "
-                    "is white is not known, convert it to 8 or 16 bits, or to floats of 0 to 1",
-                    name_, greatest));
+  bool is_tiff() const { return std::string_view(input_->format_name()) == "tiff"; }
+  // Planes one after the other: rows of all of them are far apart, and what is compressed cannot be
+  // read to and fro.
+  bool has_planes() const {
+    return is_tiff() && input_->spec().get_string_attribute("planarconfig") == "separate";
   }
+  // OpenImageIO 2.4 reads many rows of a TIFF at once as strips, and says that it has those that
+  // the file lacks or zlib refuses; of single rows it tells.
+  bool has_strips() const { return is_tiff() && input_->spec().tile_width == 0 && !has_planes(); }
 
   // Bands that are neither colours nor alpha (near infrared of drones) are left out.
   template <class T>
@@ -139,14 +128,25 @@ class OiioDecoder : public ImageDecoder {
     RawImage image{width(), height(), colors + (covered ? 1 : 0), {}};
     std::vector<T> numbers(image.count());
     const bool at_once = alpha == colors;
+    const OIIO::stride_t pixel = static_cast<OIIO::stride_t>(sizeof(T)) * image.channels;
     const auto read = [&](int first, int last, T* to) {
-      return input_->read_image(0, 0, first, last, type, to,
-                                static_cast<OIIO::stride_t>(sizeof(T)) * image.channels);
+      if (!has_strips()) {
+        const bool done = input_->read_image(0, 0, first, last, type, to, pixel);
+        return done && !(has_planes() && input_->has_error());
+      }
+      bool done = true;
+      for (int y = 0; done && y < height(); ++y, to += width() * image.channels) {
+        const int row = input_->spec().y + y;
+        done = input_->read_scanlines(0, 0, row, row + 1, 0, first, last, type, to, pixel);
+      }
+      return done;
     };
     if (!read(0, at_once ? colors + 1 : colors, numbers.data()) ||
         (covered && !at_once && !read(alpha, alpha + 1, numbers.data() + colors))) {
       throw DataError(
-          fmt::format("The image {} cannot be decoded: {}", name_, reason(input_->geterror())));
+          fmt::format("The image {} cannot be decoded ({}): copy it again if it is truncated or "
+                      "damaged, or convert it to PNG or JPEG",
+                      name_, reason(input_->geterror())));
     }
     image.numbers = std::move(numbers);
     return image;

@@ -144,8 +144,7 @@ class Apng : public VideoFile {
     const auto moment = [&](std::size_t frame) {
       return std::llround(static_cast<double>(frame) * kDelayUnit / options_.fps);
     };
-    put16(data, static_cast<std::uint16_t>(
-                    std::min<long long>(moment(frames_ + 1) - moment(frames_), UINT16_MAX)));
+    put16(data, static_cast<std::uint16_t>(moment(frames_ + 1) - moment(frames_)));
     put16(data, kDelayUnit);
     data.insert(data.end(), {0, 0});  // stays until the next, which replaces it
     chunk("fcTL", data);

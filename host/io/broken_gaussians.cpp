@@ -9,6 +9,7 @@
 
 #include "raysplats/error.hpp"
 #include "scene/gaussian_selection.hpp"
+#include "util/shell_word.hpp"
 
 namespace raysplats::io {
 
@@ -25,7 +26,7 @@ void BrokenGaussians::settle(Gaussians& model, const std::filesystem::path& path
   if (!drop) {
     throw DataError(
         fmt::format("{}: leave them out by raysplats convert {} NEW.ply --drop-nonfinite", told,
-                    path.string()));
+                    shell_word(path.string())));
   }
   std::vector<std::uint32_t> kept;
   auto next = numbers_.begin();

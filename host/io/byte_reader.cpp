@@ -8,18 +8,18 @@
 #include <fstream>
 
 #include "raysplats/error.hpp"
+#include "util/file_kind.hpp"
 
 namespace raysplats::io {
 
 std::vector<std::byte> read_file(const std::filesystem::path& path, std::uint64_t limit) {
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) {
+  if (!is_there(path)) {
     throw DataError(fmt::format("{} does not exist: check the path", path.string()));
   }
-  if (!std::filesystem::is_regular_file(status)) {
+  if (!is_file(path)) {
     throw DataError(fmt::format("{} is not a file: give the path of a file", path.string()));
   }
+  std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(path, error);
   if (error) throw DataError(fmt::format("{} cannot be read: {}", path.string(), error.message()));
   if (size > limit) {

@@ -61,7 +61,10 @@ std::vector<Camera> read_cameras(const std::filesystem::path& path) {
 void write_cameras(const std::filesystem::path& path, const std::vector<Camera>& written) {
   std::vector<Camera> cameras;
   cameras.reserve(written.size());
-  for (const Camera& camera : written) cameras.push_back(rendered_camera(camera));
+  for (const Camera& camera : written) {
+    cameras.push_back(rendered_camera(camera));
+    require_pixels(cameras.back());
+  }
   const auto intrinsics = [](Camera camera) {
     if (camera.model == CameraModel::kEquirectangular) set_equirectangular(camera);
     nlohmann::json out = io::lens_keys(camera);

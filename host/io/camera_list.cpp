@@ -11,11 +11,13 @@
 #include <nlohmann/json.hpp>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "io/byte_reader.hpp"
 #include "io/data_origin.hpp"
 #include "io/json_file.hpp"
+#include "io/text_reader.hpp"
 #include "io/transforms.hpp"
 #include "io/transforms_camera.hpp"
 #include "raysplats/error.hpp"
@@ -104,9 +106,9 @@ std::optional<Camera> camera_of(const Json& view,
 Json entries_of(const std::filesystem::path& path) {
   // The file is a list; the reader of bounded depth takes objects.
   const std::vector<std::byte> bytes = read_file(path);
-  const std::string text =
-      "{\"cameras\":" + std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()) +
-      "}";
+  std::string_view list(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  if (list.starts_with(kByteOrderMark)) list.remove_prefix(kByteOrderMark.size());
+  const std::string text = fmt::format("{{\"cameras\":{}}}", list);
   return parse_json_object(std::as_bytes(std::span(text)), path).at("cameras");
 }
 
@@ -127,6 +129,9 @@ std::vector<std::optional<Camera>> read_camera_list(const std::filesystem::path&
 bool is_camera_list(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   char first = 0;
+  for (const char byte : kByteOrderMark) {
+    if (stream.peek() == static_cast<unsigned char>(byte)) stream.get();
+  }
   return stream >> first && first == '[';
 }
 

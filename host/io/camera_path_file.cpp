@@ -124,6 +124,15 @@ void count_from_start(std::vector<Keyframe>& keys) {
 
 /// A pose of OpenGL axes (right, up, back).
 void set_pose(const std::filesystem::path& path, const Matrix& matrix, Keyframe& key) {
+  const auto ends_well = [](const std::array<double, 4>& last) {
+    return std::hypot(last[0], last[1], last[2]) < kRigid && std::abs(last[3] - 1.0) < kRigid;
+  };
+  if (!ends_well({matrix[12], matrix[13], matrix[14], matrix[15]})) {
+    fail(path, ends_well({matrix[3], matrix[7], matrix[11], matrix[15]})
+                   ? "has a matrix that seems transposed: its last column is 0 0 0 1, which has to "
+                     "be its last row (numbers go by rows, those in a text by columns)"
+                   : "has a matrix with another last row than 0 0 0 1");
+  }
   glm::dmat3 axes;
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) {
@@ -227,15 +236,19 @@ Stored read_toml(const std::filesystem::path& path) {
   for (io::TomlTable& entry : table.list("key")) {
     const auto vector = [&](const char* name) {
       const auto value = entry.vector(name);
-      if (!value) entry.fail(name, fmt::format("is missing: {} = [x, y, z]", name));
+      if (!value)
+        entry.fail(name, fmt::format("'{0}' in [[key]] is missing: {0} = [x, y, z]", name));
       return *value;
     };
     Keyframe key;
     const glm::dvec3 eye = vector("eye");
     const glm::dvec3 target = vector("target");
     const glm::dvec3 up = entry.direction("up").value_or(glm::dvec3(0, -1, 0));
-    if (!(glm::length(glm::cross(glm::normalize(up), target - eye)) > 1e-9))
-      entry.fail("up", "is along the view: eye, target and up have to span a plane");
+    if (eye == target) entry.fail("target", "'eye' and 'target' in [[key]] are the same point");
+    if (!(glm::length(glm::cross(glm::normalize(up), glm::normalize(target - eye))) > 1e-9)) {
+      entry.fail(
+          "up", "'up' in [[key]] is along the view: 'eye', 'target' and 'up' have to span a plane");
+    }
     entry.number("fov", key.fov, kLeastFov, most_fov(CameraModel::kPinhole));
     entry.number("seconds", key.seconds, 0, kMostSeconds);
     entry.finish();

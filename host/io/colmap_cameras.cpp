@@ -206,6 +206,10 @@ void read_cameras_text(const fs::path& path, ColmapModel& model) {
     std::array<double, kMaxParameters> parameters{};
     for (std::size_t p = 0; p < checked.parameters; ++p)
       parameters[p] = reader.number("a camera parameter");
+    if (const std::string_view more = reader.word(); !more.empty()) {
+      reader.fail(fmt::format("{} has {} parameters and '{}' follows them", checked.name,
+                              checked.parameters, excerpt(more)));
+    }
     add_camera(model, id,
                make_camera(checked, camera_name(path, id), width, height,
                            std::span(parameters).first(checked.parameters), fail),

@@ -54,19 +54,18 @@ ColmapImage make_image(std::string name,
   return image;
 }
 
-void add_point(ColmapModel& model,
-               const glm::dvec3& position,
-               std::span<const double, 3> rgb,
-               const Fail& fail) {
+/// Whether the model takes the point: one that is not finite is nowhere.
+bool add_point(ColmapModel& model, const glm::dvec3& position, std::span<const double, 3> rgb) {
+  const glm::vec3 place(position);
+  if (!std::isfinite(place.x) || !std::isfinite(place.y) || !std::isfinite(place.z)) return false;
   for (int i = 0; i < 3; ++i) {
-    const auto value = static_cast<float>(position[i]);
-    if (!std::isfinite(value)) fail("a point has a coordinate that is not finite");
-    model.points.positions.push_back(value);
+    model.points.positions.push_back(place[i]);
     model.positions.push_back(position[i]);
   }
   for (const double value : rgb) {
     model.points.colors.push_back(static_cast<float>(std::clamp(value, 0.0, 255.0) / 255.0));
   }
+  return true;
 }
 
 void read_images_binary(const fs::path& path, ColmapModel& model) {
@@ -145,7 +144,6 @@ void add_track(PointCloud& points, std::uint64_t length, double error) {
 void read_points_binary(const fs::path& path, ColmapModel& model) {
   const auto bytes = read_file(path);
   ByteReader reader(bytes, path);
-  const Fail fail = [&](const std::string& message) { reader.fail(message); };
   const std::uint64_t count = reader.count("number of points", 8 + 3 * 8 + 3 + 8 + 8);
   Tracks tracks;
   model.points.positions.reserve(3 * static_cast<std::size_t>(count));
@@ -159,23 +157,27 @@ void read_points_binary(const fs::path& path, ColmapModel& model) {
     std::array<double, 3> rgb;
     for (double& value : rgb) value = reader.read<std::uint8_t>("a point's colour");
     const auto error = reader.read<double>("the error of a point");
-    add_point(model, position, rgb, fail);
     const std::uint64_t length = reader.count("track length", 8);
+    if (!add_point(model, position, rgb)) {
+      reader.skip(8 * length, "the track of a point");
+      continue;
+    }
     for (std::uint64_t k = 0; k < length; ++k) {
       tracks.emplace_back(reader.read<std::uint32_t>("the track of a point"),
-                          static_cast<std::uint32_t>(i));
+                          static_cast<std::uint32_t>(model.points.size() - 1));
       reader.skip(4, "the track of a point");
     }
     add_track(model.points, length, error);
   }
+  warn_of_points(path, static_cast<std::size_t>(count) - model.points.size(), count);
   share_tracks(tracks, model);
 }
 
 void read_points_text(const fs::path& path, ColmapModel& model) {
   const auto bytes = read_file(path);
   TextReader reader(bytes, path);
-  const Fail fail = [&](const std::string& message) { reader.fail(message); };
   Tracks tracks;
+  std::size_t left_out = 0;
   while (reader.next_content_line()) {
     reader.unsigned_integer("the number of a point");
     glm::dvec3 position;
@@ -183,8 +185,11 @@ void read_points_text(const fs::path& path, ColmapModel& model) {
     std::array<double, 3> rgb;
     for (double& value : rgb)
       value = static_cast<double>(reader.unsigned_integer("a point's colour"));
-    add_point(model, position, rgb, fail);
     const double error = reader.number("the error of a point");
+    if (!add_point(model, position, rgb)) {
+      ++left_out;
+      continue;
+    }
     std::istringstream track{std::string(reader.rest())};
     const std::vector<std::string> words{std::istream_iterator<std::string>(track), {}};
     for (std::size_t k = 0; k + 1 < words.size(); k += 2) {
@@ -196,6 +201,7 @@ void read_points_text(const fs::path& path, ColmapModel& model) {
     }
     add_track(model.points, words.size() / 2, error);
   }
+  warn_of_points(path, left_out, left_out + model.points.size());
   share_tracks(tracks, model);
 }
 

@@ -72,21 +72,21 @@ std::vector<View> colmap_views(const ColmapModel& model,
   MaskFinder masks(root);
   for (const ColmapImage& image : model.images) masks.add(image.name);
   std::vector<View> views;
-  std::size_t stretched = 0, respelt = 0;
+  std::size_t stretched = 0, respelt = 0, reformatted = 0;
   RespeltFinder respelt_photos;
-  std::string first_respelt;
+  std::string first_respelt, first_reformatted;
   std::vector<std::string> missing;
   for (const ColmapImage& image : model.images) {
     View view;
-    auto photo = find_photo(folder.path, image.name);
-    if (!photo && (photo = respelt_photos.find(folder.path, image.name)) && respelt++ == 0)
-      first_respelt = image.name;
+    const auto photo = find_photo(folder.path, image.name, respelt_photos);
     if (!photo) {
       missing.push_back(image.name);
       continue;
     }
-    view.image_path = *photo;
-    view.mask_path = masks.find(image.name, *photo);
+    if (photo->respelt && respelt++ == 0) first_respelt = image.name;
+    if (photo->reformatted && reformatted++ == 0) first_reformatted = image.name;
+    view.image_path = photo->path;
+    view.mask_path = masks.find(image.name, photo->path);
     view.points = image.points;
     Camera nominal = model.cameras.at(image.camera_id);
     nominal.name = inner_name(image.name);
@@ -106,6 +106,7 @@ std::vector<View> colmap_views(const ColmapModel& model,
         advice_on_photos(root));
   }
   require_photos_of_their_own(views);
+  tell_of_extensions(reformatted, views.size(), model_folder, first_reformatted);
   tell_of_case(respelt, views.size(), model_folder, first_respelt);
   tell_of_stretched(stretched, views);
   return views;

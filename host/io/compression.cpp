@@ -8,8 +8,10 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <memory>
 
 #include "raysplats/error.hpp"
+#include "util/stop_if_interrupted.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -97,11 +99,13 @@ std::vector<std::byte> gzip(std::span<const std::span<const std::byte>> parts) {
                    Z_DEFAULT_STRATEGY) != Z_OK) {
     throw std::bad_alloc();
   }
+  const std::unique_ptr<z_stream, decltype(&deflateEnd)> end(&stream, deflateEnd);
   std::vector<std::byte> out;
   std::array<std::byte, 1 << 16> scratch;
   const auto run = [&](int flush) {
     int status = Z_OK;
     do {
+      stop_if_interrupted();
       stream.next_out = zlib_pointer(scratch.data());
       stream.avail_out = static_cast<uInt>(scratch.size());
       status = deflate(&stream, flush);
@@ -120,7 +124,6 @@ std::vector<std::byte> gzip(std::span<const std::span<const std::byte>> parts) {
   }
   stream.avail_in = 0;
   run(Z_FINISH);
-  deflateEnd(&stream);
   return out;
 }
 

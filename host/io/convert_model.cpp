@@ -3,32 +3,46 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cfloat>
+#include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 #include <utility>
+#include <vector>
 
+#include "io/data_origin.hpp"
+#include "io/gltf_gaussians.hpp"
 #include "io/model_file.hpp"
 #include "io/ply_options.hpp"
+#include "io/spz_axes.hpp"
 #include "raysplats/error.hpp"
 #include "scene/gaussian_transform.hpp"
 #include "scene/model_changes.hpp"
+#include "scene/statistics.hpp"
 #include "util/atomic_file.hpp"
+#include "util/stop_if_interrupted.hpp"
 
 namespace raysplats {
 namespace {
 
-// What a translation may leave of the distance of an origin that it takes away.
-constexpr double kLedBack = 0.01;
+// Where positions count from, in the axes of the file.
+std::string counted_from(const glm::dvec3& origin,
+                         io::ModelFormat format,
+                         const ModelEncoding& encoding) {
+  glm::dvec3 place = origin;
+  if (format == io::ModelFormat::kGltf) place = glm::dmat3(io::splatting_turn()) * origin;
+  if (format == io::ModelFormat::kSpz && encoding.spz_axes == SpzAxes::kRub)
+    place = glm::dmat3(io::spz_axes_turn(io::kSpzRub)) * origin;
+  place += 0.0;  // never -0
+  return fmt::format(", positions count from {}, {}, {}", place.x, place.y, place.z);
+}
 
 // What a file without the comments of our PLY does not say of a model.
-std::string not_said(const std::array<double, 3>& origin,
-                     const std::optional<TraceOptions>& trace) {
+std::string not_said(const std::optional<TraceOptions>& trace) {
   std::string out;
-  if (origin != std::array<double, 3>{}) {
-    out += fmt::format(", positions count from {}, {}, {}, which is not said in the file",
-                       origin[0], origin[1], origin[2]);
-  }
   if (!trace) return out;
   if (!trace->sky.empty()) out += ", the sky behind the model is not said in the file";
   const std::string flags = io::flags_to_show(*trace);
@@ -41,6 +55,47 @@ std::string not_said(const std::array<double, 3>& origin,
 glm::dvec3 origin_of(const std::filesystem::path& model) {
   const std::array<double, 3> origin = io::model_origin(model);
   return {origin[0], origin[1], origin[2]};
+}
+
+// How far single precision shifts positions, where that is seen.
+struct Blur {
+  double shift;
+  bool much;  // of the median size
+};
+
+// Of positions that are turned, scaled and then moved by `offset`. Nothing where it is no more than
+// a hundredth of the median size, or than twice of what it was before, and for what is beyond all
+// floats, which is refused where it is moved.
+std::optional<Blur> blur_of_moved(const Gaussians& model,
+                                  const glm::dmat3& linear,
+                                  double scale,
+                                  const glm::dvec3& offset) {
+  constexpr double kMuch = 0.1;
+  std::vector<double> points, log_sizes;
+  points.reserve(model.means.size());
+  log_sizes.reserve(model.size());
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    const float* m = &model.means[3 * i];
+    const float* s = &model.log_scales[3 * i];
+    const glm::dvec3 point = linear * glm::dvec3(m[0], m[1], m[2]);
+    for (int k = 0; k < 3; ++k) points.push_back(point[k]);
+    log_sizes.push_back(std::max({s[0], s[1], s[2]}));
+  }
+  const glm::dvec3 center = io::median_point(points);
+  const double size = scale * std::exp(median(std::move(log_sizes)));
+  const double most = std::max(io::kUnseenBlur * size, 2.0 * io::blur_at(center));
+  const double shift = io::blur_at(center + offset);
+  if (!(shift > most) || glm::length(center + offset) > FLT_MAX) return std::nullopt;
+  return Blur{shift, shift > kMuch * size};
+}
+
+void check_near(const glm::dvec3& origin) {
+  const glm::dvec3 size = glm::abs(origin);
+  if (std::max({size.x, size.y, size.z}) <= io::kFarthestOrigin) return;
+  throw UsageError(
+      fmt::format("The model's positions would count from {:g}, {:g}, {:g}: no number of that may "
+                  "be beyond {:g}, translate it less",
+                  origin.x, origin.y, origin.z, io::kFarthestOrigin));
 }
 
 }  // namespace
@@ -58,13 +113,25 @@ Conversion convert_model(const std::filesystem::path& input,
   const int degree = model.sh_degree;
   const glm::dmat4 map = movement(changes);
   // Positions are their numbers in the file plus its origin, which scales and turns as they do.
-  glm::dvec3 moved_origin = glm::dmat3(map) * origin_of(input);
+  const glm::dmat3 linear(map);
+  glm::dvec3 moved_origin = linear * origin_of(input);
   ModelChanges of_numbers = changes;
-  // Else the numbers would be as far away as the origin, to the other side.
-  const glm::dvec3 rest = moved_origin + changes.translate;
-  if (glm::length(rest) < kLedBack * glm::length(moved_origin)) {
-    of_numbers.translate = rest;
-    moved_origin = glm::dvec3(0.0);
+  std::string blurred;
+  if (changes.translate != glm::dvec3(0.0)) {
+    const bool had_origin = moved_origin != glm::dvec3(0.0);
+    const bool says_origin = format == io::ModelFormat::kPly;
+    moved_origin += changes.translate;
+    of_numbers.translate = glm::dvec3(0.0);
+    const auto blur = blur_of_moved(model, linear, changes.scale, moved_origin);
+    // A file that cannot say an origin does not get one: the model would stay where it was, as it
+    // does for other programs and beside models without one. So none is given for little either.
+    const bool keeps_origin = blur && (had_origin || (says_origin && blur->much));
+    if (!keeps_origin) std::swap(of_numbers.translate, moved_origin);
+    if (blur && !keeps_origin) {
+      blurred = fmt::format("32-bit numbers shift positions by {:.2g} that far away{}", blur->shift,
+                            blur->much ? ", but not in a .ply, which says an origin" : "");
+    }
+    check_near(moved_origin);
   }
   const std::array<double, 3> origin{moved_origin.x, moved_origin.y, moved_origin.z};
   for (std::size_t k = 0; of_numbers.crop && k < 3; ++k)
@@ -77,13 +144,29 @@ Conversion convert_model(const std::filesystem::path& input,
   }
   if (trace) {
     trace->sky = transformed(trace->sky, map);
-    trace->near_depth *= static_cast<float>(changes.scale);
+    const float near_depth = trace->near_depth * static_cast<float>(changes.scale);
+    if (!std::isfinite(near_depth)) {
+      throw UsageError(
+          fmt::format("The near depth of {}, {}, would be beyond what 32-bit numbers hold: use a "
+                      "smaller scale than {}",
+                      input.string(), trace->near_depth, changes.scale));
+    }
+    trace->near_depth = near_depth;
   }
+  stop_if_interrupted();
   write_model(output, result, encoding, trace, origin);
   std::string losses = io::losses(format, result);
+  if (!blurred.empty()) losses = losses == io::kNoLoss ? blurred : losses + ", " + blurred;
   const bool leaves_out = result.size() < read || result.sh_degree < degree;
   if (leaves_out && losses == io::kNoLoss) losses = "nothing but what was asked for is left out";
-  const std::string unsaid = format == io::ModelFormat::kPly ? "" : not_said(origin, trace);
+  std::string place;
+  if (moved_origin != glm::dvec3(0.0)) place = counted_from(moved_origin, format, encoding);
+  if (format == io::ModelFormat::kPly) {
+    if (!place.empty()) place += ", as its header says, which other programs pass over";
+    return {read, result.size(), result.sh_degree, losses + place};
+  }
+  if (!place.empty()) place += ", which is not said in the file";
+  const std::string unsaid = place + not_said(trace);
   if (!unsaid.empty() && losses == io::kNoLoss) losses = "no number of the Gaussians is changed";
   return {read, result.size(), result.sh_degree, losses + unsaid};
 }

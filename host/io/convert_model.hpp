@@ -20,10 +20,12 @@ struct Conversion {
 
 /// Reads `input` with the encoding, changes it and writes `output`; of `trace` the sky turns with
 /// it and the near depth scales. Coordinates are those of the data: what the file holds plus its
-/// origin (read_ply_origin()), which scales and turns with them and stays where they are moved;
-/// only a translation that leads it back to 0 takes it away. Throws as read_model(), changed() and
-/// write_model(), and UsageError when both are the same file, when `output` is there without
-/// `overwrite`, and when nothing is left to write.
+/// origin (read_ply_origin()), which scales, turns and moves with them. A translation goes into the
+/// origin and leaves the numbers alone, but where single precision holds positions without an
+/// origin, which takes it away, and where there was none and `output` cannot say one. Throws as
+/// read_model(), changed() and write_model(), and UsageError when both are the same file, when
+/// `output` is there without `overwrite`, when nothing is left to write, and for a near depth
+/// beyond single precision.
 Conversion convert_model(const std::filesystem::path& input,
                          const std::filesystem::path& output,
                          const ModelChanges& changes,

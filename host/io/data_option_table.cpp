@@ -6,15 +6,13 @@
 
 #include <array>
 
+#include "io/data_origin.hpp"
 #include "raysplats/error.hpp"
 #include "util/number_text.hpp"
 
 namespace raysplats {
 namespace {
 
-// Squares of distances have to stay within single precision, and scenes are near their cameras,
-// which may be no farther than this either.
-constexpr double kFarthestOrigin = 1e9;
 constexpr double kMostDownscale = 1024;
 
 void add_downscale_option(OptionTable& table, DatasetOptions& options) {
@@ -47,7 +45,8 @@ void add_origin_option(OptionTable& table, DatasetOptions& options) {
         const std::vector<std::string> parts = option_items("origin", values);
         std::array<double, 3> origin{};
         for (std::size_t k = 0; k < parts.size() && k < origin.size(); ++k)
-          origin[k] = option_number<double>("origin", parts[k], -kFarthestOrigin, kFarthestOrigin);
+          origin[k] =
+              option_number<double>("origin", parts[k], -io::kFarthestOrigin, io::kFarthestOrigin);
         if (parts.size() != origin.size()) {
           throw UsageError(fmt::format("The option 'origin' is auto or three numbers, not '{}'",
                                        fmt::join(values, " ")));

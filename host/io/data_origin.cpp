@@ -17,7 +17,6 @@ constexpr double kLeastSize = 1e-6;    // of the distance: cameras in one place 
 constexpr double kFarAnyway = 1e4;     // units, where nothing tells the size
 constexpr double kNearest = 0.9;       // share of the cameras or points that is the scene
 constexpr double kRounding = 0x1p-24;  // of a number in single precision
-constexpr double kBlur = 0.01;         // of a detail, that is not seen
 
 double quantile(std::vector<double> values, double q) {
   return quantiles(std::move(values), std::span<const double>(&q, 1))[0];
@@ -61,17 +60,24 @@ glm::dvec3 fitting_origin(std::span<const View> views, std::span<const double> p
 }
 
 glm::dvec3 fitting_origin(std::span<const double> points, double detail) {
+  const glm::dvec3 center = median_point(points);
+  const double away = glm::length(center);
+  if (!std::isfinite(away) || !(blur_at(center) > kUnseenBlur * detail)) return glm::dvec3(0.0);
+  const double size = quantile(distances_to(center, points), kNearest);
+  return rounded(center, std::max(size, kLeastSize * away));
+}
+
+glm::dvec3 median_point(std::span<const double> points) {
   glm::dvec3 center(0.0);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (std::size_t i = axis; i < points.size(); i += 3) values.push_back(points[i]);
     center[static_cast<int>(axis)] = quantile(std::move(values), 0.5);
   }
-  const double away = glm::length(center);
-  if (!std::isfinite(away) || !(kRounding * away > kBlur * detail)) return glm::dvec3(0.0);
-  const double size = quantile(distances_to(center, points), kNearest);
-  return rounded(center, std::max(size, kLeastSize * away));
+  return center;
 }
+
+double blur_at(const glm::dvec3& place) { return kRounding * glm::length(place); }
 
 void move_origin(Camera& camera, const glm::dvec3& origin) {
   camera.translation += camera.rotation * origin;

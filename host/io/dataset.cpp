@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <set>
 #include <span>
@@ -20,6 +21,7 @@
 #include "io/dataset_advice.hpp"
 #include "io/find_image.hpp"
 #include "io/frame_lists.hpp"
+#include "io/image_header.hpp"
 #include "io/llff.hpp"
 #include "io/photo_border.hpp"
 #include "io/photo_folder.hpp"
@@ -313,6 +315,15 @@ void check_downscale(double factor) {
       fmt::format("The downscale factor is {}: it must lie between 1 and 1024", factor));
 }
 
+void check_origin(const std::optional<std::array<double, 3>>& origin) {
+  // NaN is not near.
+  const auto near = [](double value) { return std::abs(value) <= io::kFarthestOrigin; };
+  if (!origin || std::all_of(origin->begin(), origin->end(), near)) return;
+  throw UsageError(fmt::format(
+      "The origin is {}, {}, {}: each of its numbers must lie between -{:g} and {:g}", (*origin)[0],
+      (*origin)[1], (*origin)[2], io::kFarthestOrigin, io::kFarthestOrigin));
+}
+
 /// What the files of a data set say of its views and points; no photo is decoded. `path` may name
 /// one of the files in the folder `root`.
 Dataset read_views(const fs::path& path, const fs::path& root, const DatasetOptions& options) {
@@ -349,6 +360,14 @@ double factor_in_files(const Dataset& dataset, double downscale) {
   return photo.string().starts_with("..") ? 1 : copies->factor;
 }
 
+/// Whether there may be pixels of a view of which its photo tells nothing: what is transparent, or
+/// what the lens does not reach.
+bool may_have_gaps(const View& view) {
+  const CameraModel lens = view.source_camera.model;
+  return lens == CameraModel::kOpenCv || lens == CameraModel::kFisheye ||
+         lens == CameraModel::kPhotoLens || io::may_be_transparent(view.image_path);
+}
+
 /// Finds what photos that are decoded tell of all of them, and warns of what they do not say.
 void look_at_photos(Dataset& dataset, const DatasetOptions& options) {
   io::warn_of_color_profiles(dataset.views);
@@ -363,9 +382,10 @@ void look_at_photos(Dataset& dataset, const DatasetOptions& options) {
       if (has_mask(view)) io::check_mask(view);
     }
     const bool ignores = options.masks == MaskUse::kIgnore;
+    const bool cut_out = dataset.alpha_is_background;
     if (!ignores) dataset.alpha_is_background = true;
     for (View& view : dataset.views) {
-      view.mask_apart = ignores && dataset.alpha_is_background && has_mask(view);
+      view.mask_apart = ignores ? cut_out && has_mask(view) : !cut_out && may_have_gaps(view);
       view.mask_cuts = !ignores && has_mask(view);
     }
     const auto first = std::find_if(dataset.views.begin(), dataset.views.end(), has_mask);
@@ -400,10 +420,11 @@ Dataset io::load_sized_dataset(const fs::path& path,
     throw UsageError(
         fmt::format("The test interval is {}: it must be 0 or more", options.test_every));
   }
+  check_origin(options.origin);
   const fs::path root = is_transforms(path) ? fs::absolute(path).parent_path() : path;
   if (!is_folder(root)) {
     throw DataError(fmt::format("The data set {} {}: give the folder of a data set", root.string(),
-                                is_file(root) ? "is a file" : "does not exist"));
+                                is_there(root) ? "is a file" : "does not exist"));
   }
   Dataset dataset = read_views(path, root, options);
   const double read = options.downscale;
@@ -418,6 +439,7 @@ Dataset io::load_sized_dataset(const fs::path& path,
     }
   }
   look_at_photos(dataset, options);
+  dataset.read_as = options;
   return dataset;
 }
 

@@ -10,6 +10,7 @@
 #include "io/llff.hpp"
 #include "io/polycam.hpp"
 #include "util/file_kind.hpp"
+#include "util/shell_word.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -68,7 +69,7 @@ std::string advice_for(const fs::path& root) {
       if (!is_photo_name(entry->path())) continue;
       return fmt::format(
           "; find out where its photos were taken: raysplats prepare {} -o NEW_FOLDER",
-          folder.string());
+          shell_word(folder.string()));
     }
   }
   return "";

@@ -49,11 +49,11 @@ DepthMap read_array(const std::filesystem::path& path) {
 }
 
 DepthMap read_picture(const std::filesystem::path& path) {
-  const RawImage raw = read_raw_image(path);
+  const RawImage raw = read_stored_numbers(path);
   if (raw.channels != 1 || std::holds_alternative<std::vector<std::uint8_t>>(raw.numbers)) {
     throw DataError(
-        fmt::format("The depth map {} has {} channels of {} bits: give one channel of 16 bits or "
-                    "floats",
+        fmt::format("The depth map {} has {} channels of {} bits: give one channel of 16 or "
+                    "32 bits, or floats",
                     path.string(), raw.channels,
                     raw.numbers.index() == 0   ? 8
                     : raw.numbers.index() == 1 ? 16

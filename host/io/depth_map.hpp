@@ -16,11 +16,11 @@ struct DepthMap {
   std::vector<float> values;
 };
 
-/// Reads depths: a picture of one channel with 16 bits or floats, or a .npy file of height x width
-/// numbers (read_npy(); one channel more is fine), each number times `unit`. Numbers that are not
-/// finite or not above 0 are unknown; those that are not finite are counted in a warning. Throws
-/// DataError for another format or shape. `again`: it was read before, and what was said of it then
-/// is not repeated.
+/// Reads depths: a picture of one channel with integers of 16 bits or more, as they are, or floats,
+/// or a .npy file of height x width numbers (read_npy(); one channel more is fine), each number
+/// times `unit`. Numbers that are not finite or not above 0 are unknown; those that are not finite
+/// are counted in a warning. Throws DataError for another format or shape. `again`: it was read
+/// before, and what was said of it then is not repeated.
 DepthMap read_depth_map(const std::filesystem::path& path, double unit, bool again = false);
 
 /// What is known of the depths of a view at the size of its camera: from its depth map where it has

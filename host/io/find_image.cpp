@@ -98,19 +98,34 @@ std::optional<fs::path> only_entry(const fs::path& folder,
   return found;
 }
 
+/// The file at a path, in one spelling of all that lead to it by "." and "..". The name before a
+/// ".." may be that of a link, which leads elsewhere than the names alone; these count where it is
+/// that of nothing.
+std::optional<fs::path> file_at(const fs::path& path) {
+  const fs::path normal = path.lexically_normal();
+  if (!is_file(path)) {
+    const bool leads_nowhere = normal != path && !is_folder(path.parent_path());
+    return leads_nowhere && is_file(normal) ? std::optional(normal) : std::nullopt;
+  }
+  std::error_code error;
+  if (normal == path || fs::equivalent(path, normal, error)) return normal;
+  const fs::path folder = fs::canonical(path.parent_path(), error);
+  return error ? path : folder / path.filename();
+}
+
 }  // namespace
 
 std::optional<fs::path> find_image(const fs::path& folder, const fs::path& file_path) {
-  const fs::path exact = (folder / file_path).lexically_normal();
-  if (is_file(exact)) return exact;
+  const fs::path exact = folder / file_path;
+  if (auto file = file_at(exact)) return file;
   // Without an extension any will do; with one only its case may differ.
   const bool named = has_image_extension(exact);
   const std::string stem = named ? fs::path(exact).replace_extension().string() : exact.string();
   for (std::string extension : kImageExtensions) {
     if (named && lower_extension(exact) != extension) continue;
-    if (is_file(stem + extension)) return stem + extension;
+    if (auto file = file_at(stem + extension)) return file;
     for (char& c : extension) c = static_cast<char>(std::toupper(static_cast<unsigned char>(c)));
-    if (is_file(stem + extension)) return stem + extension;
+    if (auto file = file_at(stem + extension)) return file;
   }
   return std::nullopt;
 }

@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -74,8 +73,7 @@ void set_gif_delays(const std::filesystem::path& path,
     return std::llround(static_cast<double>(frame) * kClock / fps);
   };
   for (std::size_t i = 0; i < frames; ++i) {
-    const auto ticks =
-        static_cast<std::uint16_t>(std::min<long long>(moment(i + 1) - moment(i), UINT16_MAX));
+    const auto ticks = static_cast<std::uint16_t>(moment(i + 1) - moment(i));
     file.seekp(places[i]);
     file.put(static_cast<char>(ticks & 0xff)).put(static_cast<char>(ticks >> 8));
   }

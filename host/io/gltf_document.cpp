@@ -231,8 +231,9 @@ GltfContent take_content(GltfDocument& document,
   take("buffers", "buffer", [&](const json& from, std::size_t i) {
     content.buffers.push_back(reader.buffer(from, i, document));
   });
-  take("images", "image",
-       [&](const json& from, std::size_t i) { content.images.push_back(reader.image(from, i)); });
+  take("images", "image", [&](const json& from, std::size_t i) {
+    if (!alone) content.images.push_back(reader.image(from, i));
+  });
   return content;
 }
 

@@ -35,8 +35,9 @@ struct GltfContent {
 };
 
 /// Takes the buffers and images out of a document: from its binary chunk, its data: URIs and the
-/// files beside it, at most `limit` bytes of these. One that stands alone must name no files: none
-/// is opened. Throws DataError, also for a buffer's file that is missing.
+/// files beside it, at most `limit` bytes of these. One that stands alone must have all buffers in
+/// it, and its images are left out: no file is opened. Throws DataError, also for a buffer's file
+/// that is missing.
 GltfContent take_content(GltfDocument& document,
                          const std::filesystem::path& path,
                          bool alone,

@@ -22,8 +22,6 @@
 namespace raysplats::io {
 namespace {
 
-/// Smallest scale that has a logarithm to go on with.
-constexpr float kLeastScale = 1e-30f;
 /// Nodes may show a mesh again, but a small file is not to ask for all memory that way.
 constexpr std::size_t kMostCopies = 64;
 
@@ -96,8 +94,11 @@ Gaussians read_primitive(const GltfReader& reader,
   };
   Gaussians model;
   model.means = numbers("POSITION", 3);
+  // By any coefficient, so that one that is missing is told below.
   for (int degree = 1; degree <= kSplattingMaxDegree; ++degree) {
-    if (attribute(primitive, splatting_harmonic(degree, 0)) >= 0) model.sh_degree = degree;
+    for (int n = 0; n <= 2 * degree; ++n) {
+      if (attribute(primitive, splatting_harmonic(degree, n)) >= 0) model.sh_degree = degree;
+    }
   }
   model.resize(count);
   const std::vector<float> rotations = numbers(kSplattingRotation, 4);
@@ -115,7 +116,7 @@ Gaussians read_primitive(const GltfReader& reader,
             "a scale is negative, a logarithm perhaps, as splat-transform wrote them until June "
             "2026: write it again by a newer one");
       }
-      model.log_scales[3 * i + k] = std::log(std::max(scale, kLeastScale));
+      model.log_scales[3 * i + k] = std::log(std::max(scale, kSplattingLeastScale));
     }
     model.opacities[i] = logit_of(static_cast<double>(opacities[i]));
   }
@@ -154,7 +155,7 @@ Gaussians read_gltf_gaussians(const std::filesystem::path& path, bool drop_nonfi
   const tinygltf::Model file = parse_gltf(path);
   const GltfReader reader(file, path);
   std::vector<std::optional<Gaussians>> meshes(file.meshes.size());
-  std::vector<Gaussians> placed;
+  std::vector<std::pair<std::size_t, glm::dmat4>> places;
   std::size_t own = 0;
   std::size_t total = 0;
   for_each_placed_mesh(reader, [&](int number, const glm::dmat4& matrix) {
@@ -171,16 +172,22 @@ Gaussians read_gltf_gaussians(const std::filesystem::path& path, bool drop_nonfi
       own += meshes[index]->size();
     }
     total += meshes[index]->size();
-    if (total > kMostCopies * own) {
-      reader.fail(fmt::format("its nodes show {} Gaussians, more than {} times what it holds",
-                              total, kMostCopies));
-    }
+    places.emplace_back(index, matrix);
+  });
+  if (total > kMostCopies * own) {
+    throw DataError(
+        fmt::format("The nodes of {} show {} Gaussians, more than {} times the {} that it holds: "
+                    "export it with fewer nodes that show the same mesh",
+                    path.string(), total, kMostCopies, own));
+  }
+  std::vector<Gaussians> placed;
+  for (const auto& [index, matrix] : places) {
     try {
       placed.push_back(transformed(*meshes[index], splatting_turn() * matrix));
     } catch (const UsageError& error) {
       reader.fail(error.what());
     }
-  });
+  }
   if (placed.empty()) {
     throw DataError(fmt::format("{} is no 3D Gaussian model: no mesh of its scene has {}",
                                 path.string(), kSplattingExtension));

@@ -13,6 +13,8 @@ constexpr const char* kSplattingRotation = "KHR_gaussian_splatting:ROTATION";
 constexpr const char* kSplattingScale = "KHR_gaussian_splatting:SCALE";
 constexpr const char* kSplattingOpacity = "KHR_gaussian_splatting:OPACITY";
 constexpr int kSplattingMaxDegree = 3;
+/// Smallest scale that has a logarithm to go on with.
+constexpr float kSplattingLeastScale = 1e-30f;
 
 /// Coefficient n = 0 .. 2 * degree, from the lowest order on.
 std::string splatting_harmonic(int degree, int n);

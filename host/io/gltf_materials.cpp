@@ -172,6 +172,14 @@ GltfTextureUse GltfMaterials::texture_use(int material) const {
     set = index_of(extension->second, "texCoord", set);
   }
   use.attribute = fmt::format("TEXCOORD_{}", set);
+  const tinygltf::Model& model = reader_.model();
+  const auto texture = static_cast<std::size_t>(info.index);
+  const int sampler = texture < model.textures.size() ? model.textures[texture].sampler : -1;
+  if (sampler >= 0 && static_cast<std::size_t>(sampler) < model.samplers.size()) {
+    const tinygltf::Sampler& from = model.samplers[static_cast<std::size_t>(sampler)];
+    use.repeats[0] = from.wrapS == TINYGLTF_TEXTURE_WRAP_REPEAT;
+    use.repeats[1] = from.wrapT == TINYGLTF_TEXTURE_WRAP_REPEAT;
+  }
   return use;
 }
 
@@ -262,6 +270,11 @@ Material GltfMaterials::map_material(const tinygltf::Material& from, int number_
   const Surface surface =
       specular != nullptr ? specular_glossiness(*specular) : metallic_roughness(from);
   for (std::size_t c = 0; c < 3; ++c) material.color[c] = encoded(surface.color[c]);
+  if (from.alphaMode == "MASK" && surface.alpha < from.alphaCutoff) {
+    material.kind = Material::Kind::kTransparent;
+    material.opacity = 0.0f;
+    return material;
+  }
   material.texture = texture(surface.texture);
   if (from.alphaMode != "OPAQUE" && cut_out_.contains(surface.texture) && !warned_of_alpha_) {
     warned_of_alpha_ = true;

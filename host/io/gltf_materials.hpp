@@ -17,13 +17,14 @@
 
 namespace raysplats::io {
 
-/// How the base colour texture of a glTF material is laid on a primitive.
+/// How the base colour texture of a glTF material, or another in its place, is laid on a primitive.
 struct GltfTextureUse {
-  std::string attribute;  ///< "TEXCOORD_0" and so on
+  std::string attribute = "TEXCOORD_0";
   /// uv' = offset + R(rotation) scale uv (KHR_texture_transform)
   double offset[2] = {0, 0};
   double scale[2] = {1, 1};
   double rotation = 0;
+  bool repeats[2] = {true, true};  ///< beyond its borders, along u and v
 };
 
 /// The materials of a glTF file, mapped when a primitive first uses them; the first row that
@@ -31,6 +32,7 @@ struct GltfTextureUse {
 ///
 /// | glTF | Material |
 /// | --- | --- |
+/// | alphaMode MASK, alpha < alphaCutoff | transparent of opacity 0 |
 /// | KHR_materials_transmission >= 0.5 | glass; KHR_materials_ior, attenuation as absorption |
 /// | alphaMode BLEND, alpha < 1 | transparent of opacity alpha |
 /// | metallic >= 0.5 and roughness <= 0.5 | mirror of that roughness |
@@ -53,7 +55,7 @@ class GltfMaterials {
   /// Index in `materials` of a material of the file; -1 is the default one. Throws DataError for
   /// references to what the file lacks and for textures that cannot be decoded.
   std::uint32_t index(int material);
-  /// Of a material's base colour texture; an empty attribute when it has none.
+  /// Of a material's base colour texture.
   GltfTextureUse texture_use(int material) const;
   /// Glass without a volume (KHR_materials_volume with a thickness) is a thin sheet, which light
   /// passes straight on: such is glass from here on that is open somewhere in the mesh. Exporters

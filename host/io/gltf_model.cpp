@@ -65,6 +65,23 @@ float load_integer(const std::byte* bytes, bool normalized) {
   return std::max(value / static_cast<float>(std::numeric_limits<T>::max()), -1.0f);
 }
 
+/// How textures go on beyond their borders; what is no number repeats them.
+std::vector<tinygltf::Sampler> take_samplers(GltfDocument& document) {
+  std::vector<tinygltf::Sampler> samplers;
+  const auto list = document.json.find("samplers");
+  if (list == document.json.end()) return samplers;
+  for (const nlohmann::json& from : *list) {
+    tinygltf::Sampler& sampler = samplers.emplace_back();
+    for (const auto& [key, wrap] :
+         {std::pair{"wrapS", &sampler.wrapS}, std::pair{"wrapT", &sampler.wrapT}}) {
+      if (from.is_object() && from.contains(key) && from[key].is_number_integer())
+        *wrap = from[key].get<int>();
+    }
+  }
+  document.json.erase(list);
+  return samplers;
+}
+
 }  // namespace
 
 tinygltf::Model parse_gltf(const std::filesystem::path& path) {
@@ -79,7 +96,8 @@ tinygltf::Model parse_gltf(const std::filesystem::path& path,
   // tinygltf would take data: URIs of unknown media types for names of files, and with what is not
   // read here it finds faults that are none.
   GltfContent content = take_content(document, path, alone, kMaxBytes);
-  for (const char* unread : {"animations", "cameras", "extensions", "samplers", "skins"}) {
+  std::vector<tinygltf::Sampler> samplers = take_samplers(document);
+  for (const char* unread : {"animations", "cameras", "extensions", "skins"}) {
     document.json.erase(unread);
   }
   const std::string text = document.json.dump();
@@ -102,6 +120,7 @@ tinygltf::Model parse_gltf(const std::filesystem::path& path,
   }
   model.buffers = std::move(content.buffers);
   model.images = std::move(content.images);
+  model.samplers = std::move(samplers);
   return model;
 }
 

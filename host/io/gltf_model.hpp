@@ -13,11 +13,11 @@
 namespace raysplats::io {
 
 /// Parses a glTF 2.0 file, JSON or GLB, with its external buffers; images stay encoded
-/// (GltfReader::image()), and skins, animations, cameras and samplers are left out. Throws
-/// DataError for what read_gltf_document(), take_content() or tinygltf refuse.
+/// (GltfReader::image()), samplers have their wrapping alone, and skins, animations and cameras are
+/// left out. Throws DataError for what read_gltf_document(), take_content() or tinygltf refuse.
 tinygltf::Model parse_gltf(const std::filesystem::path& path);
-/// The same of a file that has been read. One that stands alone must not name others: no file is
-/// opened.
+/// The same of a file that has been read. One that stands alone must have all buffers in it, and
+/// its images are left out: no file is opened.
 tinygltf::Model parse_gltf(const std::filesystem::path& path,
                            std::span<const std::byte> bytes,
                            bool alone);

@@ -57,6 +57,9 @@ class ImageDecoder {
   virtual std::string color_profile() const { return {}; }
   /// Throws DataError.
   virtual RawImage decode() = 0;
+  /// Of integers that decode() gives as floats, the greatest that their type has, which is 1 there;
+  /// 0 of other numbers.
+  virtual double greatest_integer() const { return 0.0; }
 };
 
 /// A network that compares pictures; see Lpips.

@@ -5,10 +5,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <span>
 #include <string>
 #include <string_view>
+#include <variant>
+#include <vector>
 
 #include "io/byte_reader.hpp"
 #include "io/image_codec.hpp"
@@ -24,6 +28,9 @@
 
 namespace raysplats {
 namespace {
+
+/// Of the greatest integer that there is: less is no photo's brightest pixel.
+constexpr float kLeastWhite = 1.0f / 256.0f;
 
 constexpr const char* kFormats = "PNG, JPEG, EXR, HDR, TIFF, WebP, BMP, GIF, TGA, HEIF or AVIF";
 
@@ -62,11 +69,54 @@ std::string checked_format(const std::filesystem::path& path, bool for_pixels) {
     const std::vector<std::byte> bytes = io::read_file(path);
     const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     whole = format == "png" ? io::has_whole_png_chunks(text, false) : io::is_whole_jpeg(bytes);
+  } else if (for_pixels && format == "tiff") {
+    stream.clear();
+    stream.seekg(0);
+    whole = io::has_whole_jpeg_strips(stream);
   } else if (format == "png") {
     whole = io::has_whole_png_chunks(start, true);
   }
   if (!whole) fail_damaged(path.string());
   return std::string(format);
+}
+
+/// No file says what is white among integers of 32 bits or more. The codec takes the greatest that
+/// there are; beside it counts, labels and numbers of a camera, of 16 bits or less, are all black.
+void require_known_white(const io::RawImage& image,
+                         double greatest,
+                         const std::filesystem::path& path) {
+  if (greatest <= UINT16_MAX) return;
+  const auto channels = static_cast<std::size_t>(image.channels);
+  const std::size_t colors = channels - (channels % 2 == 0 ? 1 : 0);
+  const auto& numbers = std::get<std::vector<float>>(image.numbers);
+  float most = 0.0f;
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    if (i % channels < colors) most = std::max(most, numbers[i]);
+  }
+  if (most == 0.0f || most >= kLeastWhite) return;
+  throw DataError(fmt::format(
+      "The image {} has integers of more than 16 bits, of which the greatest is {:.0f}: what "
+      "is white is not known, convert it to 8 or 16 bits, or to floats of 0 to 1",
+      path.string(), static_cast<double>(most) * greatest));
+}
+
+/// Takes out alpha that is 0 everywhere.
+void drop_unused_alpha(io::RawImage& image) {
+  const auto channels = static_cast<std::size_t>(image.channels);
+  if (channels % 2 != 0) return;
+  std::visit(
+      [&](auto& numbers) {
+        std::size_t kept = 0;
+        for (std::size_t i = channels - 1; i < numbers.size(); i += channels) {
+          if (numbers[i] > 0) return;
+        }
+        for (std::size_t i = 0; i < numbers.size(); ++i) {
+          if (i % channels != channels - 1) numbers[kept++] = numbers[i];
+        }
+        numbers.resize(kept);
+        --image.channels;
+      },
+      image.numbers);
 }
 
 std::vector<std::string> exr_channel_names(const Image& image,
@@ -135,7 +185,22 @@ Image decode_image(std::span<const std::byte> bytes, const std::string& name) {
 }
 
 RawImage read_raw_image(const std::filesystem::path& path) {
-  return image_codec().open(checked_format(path, true), path.string(), {})->decode();
+  const std::string format = checked_format(path, true);
+  const auto decoder = image_codec().open(format, path.string(), {});
+  RawImage image = decoder->decode();
+  require_known_white(image, decoder->greatest_integer(), path);
+  if (!states_alpha(path, format)) drop_unused_alpha(image);
+  return image;
+}
+
+RawImage read_stored_numbers(const std::filesystem::path& path) {
+  const auto decoder = image_codec().open(checked_format(path, true), path.string(), {});
+  RawImage image = decoder->decode();
+  if (const double greatest = decoder->greatest_integer(); greatest > 0.0) {
+    for (float& number : std::get<std::vector<float>>(image.numbers))
+      number = static_cast<float>(std::round(greatest * static_cast<double>(number)));
+  }
+  return image;
 }
 
 }  // namespace io

@@ -33,6 +33,9 @@ std::string color_profile(const std::filesystem::path& path);
 /// read_image() without a conversion of its numbers.
 RawImage read_raw_image(const std::filesystem::path& path);
 
+/// The same of what no colours are: integers as the file has them, no shares of the greatest.
+RawImage read_stored_numbers(const std::filesystem::path& path);
+
 /// read_image() of a PNG or JPEG file in memory; `name` stands for its path in errors.
 Image decode_image(std::span<const std::byte> bytes, const std::string& name);
 

@@ -190,6 +190,21 @@ bool may_be_transparent(const std::filesystem::path& path) {
   return found;
 }
 
+bool states_alpha(const std::filesystem::path& path, std::string_view format) {
+  std::ifstream stream(path, std::ios::binary);
+  if (format == "targa") {
+    stream.seekg(17);
+    return (stream.get() & 15) != 0;
+  }
+  if (format != "bmp") return true;
+  // BITMAPINFOHEADER is shorter than those with a mask of alpha.
+  constexpr int kLeastBytes = 56;
+  stream.seekg(14);
+  if (stream.get() < kLeastBytes) return false;
+  stream.seekg(66);
+  return big_endian(stream, 4).value_or(0) != 0;
+}
+
 std::optional<double> png_gamma(const std::filesystem::path& path) {
   constexpr double kUnits = 100000;  // PNG specification, section 11.3.2.2
   std::ifstream stream(path, std::ios::binary);

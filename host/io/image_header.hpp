@@ -29,6 +29,10 @@ bool may_have_profile(const std::filesystem::path& path, std::string_view format
 /// other.
 bool may_be_transparent(const std::filesystem::path& path);
 
+/// Whether the header of a "bmp" or "targa" file says that pixels have alpha; others have what they
+/// say. Those that say nothing have it all the same, or 0 in a byte that is not used.
+bool states_alpha(const std::filesystem::path& path, std::string_view format);
+
 /// The exponent that made the numbers of a PNG of light, about 0.45 of display values, where its
 /// chunk gAMA alone says it; nothing for other files, and where a profile or sRGB goes before it.
 std::optional<double> png_gamma(const std::filesystem::path& path);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/image_integrity.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -66,6 +67,44 @@ bool has_whole_png_chunks(std::string_view bytes, bool header_only) {
     i += length + kAroundData;
   }
   return false;
+}
+
+bool has_whole_jpeg_strips(std::istream& file) {
+  const bool little = file.get() == 'I';
+  // The stream fails for good at what lies beyond the end.
+  const auto number = [&](std::uint64_t at, std::uint64_t bytes) {
+    std::array<char, 8> raw{};
+    file.seekg(static_cast<std::streamoff>(at));
+    file.read(raw.data(), static_cast<std::streamsize>(bytes));
+    std::uint64_t value = 0;
+    for (std::size_t i = 0; i < bytes; ++i)
+      value = value << 8 | static_cast<std::uint8_t>(raw[little ? bytes - 1 - i : i]);
+    return value;
+  };
+  const bool big = number(2, 2) == 43;
+  const std::uint64_t word = big ? 8 : 4, counter = big ? 8 : 2;
+  const std::uint64_t directory = number(word, word), entries = number(directory, counter);
+  struct List {
+    std::uint64_t at = 0, count = 0, width = 0;
+  };
+  List offsets, sizes;
+  bool jpeg = false;
+  for (std::uint64_t i = 0; file && i < entries; ++i) {
+    const std::uint64_t entry = directory + counter + i * (4 + 2 * word), value = entry + 4 + word;
+    const std::uint64_t tag = number(entry, 2), type = number(entry + 2, 2);
+    List list{value, number(entry + 4, word), type == 3 ? 2u : type == 16 ? 8u : 4u};
+    if (list.count > word / list.width) list.at = number(value, word);
+    if (tag == 259) jpeg = number(value, 2) == 7;
+    if (tag == 273 || tag == 324) offsets = list;
+    if (tag == 279 || tag == 325) sizes = list;
+  }
+  if (!jpeg) return true;
+  for (std::uint64_t i = 0; file && i < std::min(offsets.count, sizes.count); ++i) {
+    const std::uint64_t size = number(sizes.at + i * sizes.width, sizes.width);
+    const std::uint64_t end = number(offsets.at + i * offsets.width, offsets.width) + size;
+    if (size > 0) number(end - 1, 1);
+  }
+  return static_cast<bool>(file);
 }
 
 }  // namespace raysplats::io

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <istream>
 #include <span>
 #include <string_view>
 
@@ -19,5 +20,10 @@ constexpr std::size_t kPngHeaderBytes = 33;
 /// to the end chunk or, with `header_only`, the header chunk. `bytes` begin with the signature.
 /// libpng would print a line of its own for what this finds.
 bool has_whole_png_chunks(std::string_view bytes, bool header_only);
+
+/// Whether the strips or tiles of a TIFF's first picture lie within the file, where they are JPEG
+/// (TIFF 6.0, section 2, and BigTIFF): of those that miss libtiff says nothing when it makes
+/// colours of them. True for other TIFF files.
+bool has_whole_jpeg_strips(std::istream& file);
 
 }  // namespace raysplats::io

@@ -14,6 +14,10 @@ namespace {
 
 /// Cutting ears takes quadratic time on the worst polygons.
 constexpr std::size_t kMaxPolygon = 4096;
+/// Looks at corners for each triangle that a mesh may have: a second or two for one that stands
+/// alone, enough for thousands of polygons of a hundred corners, but only for some ten of
+/// kMaxPolygon where half of the corners are reflex.
+constexpr std::size_t kMostWork = 64;
 
 }  // namespace
 
@@ -39,7 +43,7 @@ std::uint32_t MeshBuilder::add_vertex(const std::array<float, 3>& position,
   put(mesh_.normals, normal.value_or(std::array<float, 3>{0, 0, 0}));
   put(mesh_.uvs, uv.value_or(std::array<float, 2>{0, 0}));
   has_normal_.push_back(normal.has_value());
-  has_uvs_ = has_uvs_ || uv.has_value();
+  has_uv_.push_back(uv.has_value());
   return index;
 }
 
@@ -49,6 +53,7 @@ void MeshBuilder::add_polygon(std::span<const std::uint32_t> vertices, std::uint
         fmt::format("The mesh {} has a face with {} corners, more than {}: triangulate it first",
                     path_.string(), vertices.size(), kMaxPolygon));
   }
+  check_room(0, vertices.size() - 2);
   if (vertices.size() == 3) {
     mesh_.triangles.insert(mesh_.triangles.end(), vertices.begin(), vertices.end());
     mesh_.materials.push_back(material);
@@ -59,9 +64,15 @@ void MeshBuilder::add_polygon(std::span<const std::uint32_t> vertices, std::uint
     const float* p = &mesh_.positions[3 * vertex];
     corners_.emplace_back(p[0], p[1], p[2]);
   }
-  for (const auto& triangle : triangulate(corners_)) {
+  for (const auto& triangle : triangulate(corners_, &work_)) {
     for (const std::size_t corner : triangle) mesh_.triangles.push_back(vertices[corner]);
     mesh_.materials.push_back(material);
+  }
+  if (work_ / kMostWork > most_) {
+    throw DataError(
+        fmt::format("The mesh {} has faces of many corners that take too long to cut: triangulate "
+                    "them first",
+                    path_.string()));
   }
 }
 
@@ -76,13 +87,21 @@ void MeshBuilder::append(const Mesh& part) {
   add(mesh_.normals, part.normals, 3 * part.vertex_count());
   add(mesh_.uvs, part.uvs, 2 * part.vertex_count());
   has_normal_.resize(has_normal_.size() + part.vertex_count(), !part.normals.empty());
-  has_uvs_ = has_uvs_ || !part.uvs.empty();
+  has_uv_.resize(has_uv_.size() + part.vertex_count(), !part.uvs.empty());
   for (const std::uint32_t vertex : part.triangles) mesh_.triangles.push_back(first + vertex);
   mesh_.materials.insert(mesh_.materials.end(), part.materials.begin(), part.materials.end());
 }
 
+std::vector<bool> MeshBuilder::bare() const {
+  std::vector<bool> result(mesh_.triangle_count());
+  for (std::size_t i = 0; i < mesh_.triangles.size(); ++i)
+    if (!has_uv_[mesh_.triangles[i]]) result[i / 3] = true;
+  return result;
+}
+
 Mesh MeshBuilder::finish() {
-  if (!has_uvs_) mesh_.uvs.clear();
+  const bool has_uvs = std::find(has_uv_.begin(), has_uv_.end(), true) != has_uv_.end();
+  if (!has_uvs) mesh_.uvs.clear();
   const auto with_normal = std::count(has_normal_.begin(), has_normal_.end(), true);
   if (with_normal == 0) {
     mesh_.normals.clear();
@@ -112,7 +131,7 @@ Mesh MeshBuilder::finish() {
           mesh_.positions.push_back(mesh_.positions[3 * vertex + c]);
           mesh_.normals.push_back(0.0f);
         }
-        for (std::size_t c = 0; has_uvs_ && c < 2; ++c) {
+        for (std::size_t c = 0; has_uvs && c < 2; ++c) {
           mesh_.uvs.push_back(mesh_.uvs[2 * vertex + c]);
         }
         corner = static_cast<std::uint32_t>(own);

@@ -34,10 +34,13 @@ class MeshBuilder {
   std::uint32_t add_vertex(const std::array<float, 3>& position,
                            const std::optional<std::array<float, 3>>& normal,
                            const std::optional<std::array<float, 2>>& uv);
-  /// A polygon of at least three vertices, all added before, is triangulated.
+  /// A polygon of at least three vertices, all added before, is triangulated. Throws DataError
+  /// where its triangles are too many, or all polygons together take too long to cut.
   void add_polygon(std::span<const std::uint32_t> vertices, std::uint32_t material);
   /// A whole mesh whose arrays fit each other and whose indices are in range.
   void append(const Mesh& part);
+  /// Per triangle so far whether a corner has no texture coordinates.
+  std::vector<bool> bare() const;
   Mesh finish();
 
  private:
@@ -45,7 +48,8 @@ class MeshBuilder {
   std::size_t most_;
   Mesh mesh_;  ///< with normals and uvs for every vertex
   std::vector<bool> has_normal_;
-  bool has_uvs_ = false;
+  std::vector<bool> has_uv_;
+  std::size_t work_ = 0;             ///< of cutting polygons
   std::vector<glm::dvec3> corners_;  ///< of the polygon being added
 };
 

@@ -17,6 +17,7 @@ struct MeshFile {
   Mesh mesh;                        ///< has triangles and passes validate()
   std::vector<Material> materials;  ///< at least one; `texture` indexes `textures`
   std::vector<Image> textures;      ///< 3 channels
+  std::vector<bool> bare;           ///< per triangle: a corner has no texture coordinates
 };
 
 /// Whether a material of a mesh file, by its name, will be seen; an empty one says so of all.

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <glm/mat4x4.hpp>
@@ -16,6 +17,7 @@
 #include "io/gltf_nodes.hpp"
 #include "io/mesh_builder.hpp"
 #include "io/mesh_file.hpp"
+#include "raysplats/error.hpp"
 #include "scene/mesh.hpp"
 
 namespace raysplats::io {
@@ -59,6 +61,7 @@ class SceneWalk {
       for (const Mesh& part : *parts_[mesh]) builder_.append(transformed(part, matrix));
     }
     MeshFile file;
+    file.bare = builder_.bare();
     file.mesh = builder_.finish();
     materials_.make_thin_glass(file.mesh);
     file.materials = std::move(materials_.materials);
@@ -102,20 +105,7 @@ class SceneWalk {
     if (normals >= 0) part.normals = reader_.floats(normals, 3);
     const std::uint32_t material = materials_.index(primitive.material);
     warn_of_colors(primitive, materials_.materials[material].name);
-    const GltfTextureUse use = materials_.texture_use(primitive.material);
-    const int uvs = use.attribute.empty() ? -1 : attribute(primitive, use.attribute);
-    if (uvs >= 0) {
-      part.uvs = reader_.floats(uvs, 2);
-      const double c = std::cos(use.rotation);
-      const double s = std::sin(use.rotation);
-      for (std::size_t i = 0; i + 1 < part.uvs.size(); i += 2) {
-        const double u = static_cast<double>(part.uvs[i]) * use.scale[0];
-        const double v = static_cast<double>(part.uvs[i + 1]) * use.scale[1];
-        // Counter-clockwise in the image, whose v axis points down.
-        part.uvs[i] = static_cast<float>(use.offset[0] + c * u + s * v);
-        part.uvs[i + 1] = static_cast<float>(use.offset[1] - s * u + c * v);
-      }
-    }
+    part.uvs = texture_coordinates(primitive, materials_.materials[material], part.vertex_count());
     std::vector<std::uint32_t> corners;
     if (primitive.indices >= 0) {
       corners = reader_.indices(primitive.indices);
@@ -129,6 +119,37 @@ class SceneWalk {
     return part;
   }
 
+  /// The texture coordinates of a primitive. Broken ones count as none where the file lays no
+  /// texture with them.
+  std::vector<float> texture_coordinates(const tinygltf::Primitive& primitive,
+                                         const Material& material,
+                                         std::size_t vertices) {
+    const GltfTextureUse use = materials_.texture_use(primitive.material);
+    const int accessor = attribute(primitive, use.attribute);
+    if (accessor < 0) return {};
+    std::vector<float> uvs;
+    try {
+      uvs = reader_.floats(accessor, 2);
+    } catch (const DataError&) {
+      if (material.texture >= 0) throw;
+      return {};
+    }
+    const double c = std::cos(use.rotation);
+    const double s = std::sin(use.rotation);
+    for (std::size_t i = 0; i + 1 < uvs.size(); i += 2) {
+      const double u = static_cast<double>(uvs[i]) * use.scale[0];
+      const double v = static_cast<double>(uvs[i + 1]) * use.scale[1];
+      // Counter-clockwise in the image, whose v axis points down.
+      uvs[i] = static_cast<float>(use.offset[0] + c * u + s * v);
+      uvs[i + 1] = static_cast<float>(use.offset[1] - s * u + c * v);
+    }
+    const bool fit = uvs.size() == 2 * vertices &&
+                     std::all_of(uvs.begin(), uvs.end(), [](float x) { return std::isfinite(x); });
+    if (material.texture < 0 && !fit) return {};
+    warn_of_wrapping(use, uvs, material);
+    return uvs;
+  }
+
   /// Warns once of vertex colours.
   void warn_of_colors(const tinygltf::Primitive& primitive, const std::string& material) {
     if (warned_of_colors_ || attribute(primitive, "COLOR_0") < 0) return;
@@ -136,6 +157,21 @@ class SceneWalk {
     warned_of_colors_ = true;
     spdlog::warn("{}: the colours of its vertices are left out: it has those of its materials",
                  reader_.path().string());
+  }
+
+  /// Warns once of a texture that shows beyond its borders and should not repeat there.
+  void warn_of_wrapping(const GltfTextureUse& use,
+                        const std::vector<float>& uvs,
+                        const Material& material) {
+    constexpr float kRounding = 1e-3f;
+    if (warned_of_wrapping_ || material.texture < 0) return;
+    for (std::size_t i = 0; i < uvs.size(); ++i) {
+      if (use.repeats[i % 2] || std::abs(uvs[i] - 0.5f) <= 0.5f + kRounding) continue;
+      warned_of_wrapping_ = true;
+      spdlog::warn("{}: the wrapping of the texture of the material '{}' is left out: it repeats",
+                   reader_.path().string(), material.name);
+      return;
+    }
   }
 
   const GltfReader& reader_;
@@ -147,6 +183,7 @@ class SceneWalk {
   std::size_t vertices_ = 0;                                ///< of all that are placed
   std::size_t triangles_ = 0;
   bool warned_of_colors_ = false;
+  bool warned_of_wrapping_ = false;
 };
 
 }  // namespace

@@ -196,7 +196,7 @@ class Collector {
   }
 
   /// Faces may name vertices that follow them, so they are put together at the end.
-  Mesh finish() {
+  void finish(MeshFile& file) {
     std::vector<std::uint32_t> polygon;
     std::size_t first = 0;
     for (std::size_t face = 0; face < faces_.size(); ++face) {
@@ -207,7 +207,8 @@ class Collector {
       first += faces_[face].corners;
       builder_.add_polygon(polygon, faces_[face].material);
     }
-    return builder_.finish();
+    file.bare = builder_.bare();
+    file.mesh = builder_.finish();
   }
 
  private:
@@ -310,7 +311,7 @@ MeshFile read_obj(MeshBytes source) {
                                 errors.substr(0, errors.find('\n'))));
   }
   MeshFile file;
-  file.mesh = collector.finish();
+  collector.finish(file);
   file.materials = std::move(materials.materials);
   const bool seen = std::any_of(
       file.materials.begin(), file.materials.end(),

@@ -115,6 +115,7 @@ MeshFile read_ply_mesh(MeshBytes source) {
   }
   warn_of_colors(file, source);
   MeshFile result;
+  result.bare = builder.bare();
   result.mesh = builder.finish();
   result.materials.emplace_back().name = kMaterial;
   return result;

@@ -5,10 +5,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <fstream>
 #include <span>
 #include <string>
+#include <vector>
 
+#include "io/gaussian_codes.hpp"
 #include "io/gltf_gaussians.hpp"
 #include "io/model_formats.hpp"
 #include "io/sog_file.hpp"
@@ -33,30 +36,46 @@ std::string first_bytes(const std::filesystem::path& path) {
   return std::string(bytes.data(), static_cast<std::size_t>(stream.gcount()));
 }
 
-/// What of a model lies beyond what SPZ has codes for, and is cut.
+/// What of a model is cut to a range, as a part of a sentence: of the Gaussians' numbers, `stride`
+/// of each, `count` from the number `first` on. "" where all lie within it.
+std::string clamped(const char* what,
+                    const std::vector<float>& numbers,
+                    std::size_t stride,
+                    std::size_t first,
+                    std::size_t count,
+                    double least,
+                    double most) {
+  std::size_t beyond = 0;
+  for (std::size_t i = 0; i < numbers.size(); i += stride) {
+    const std::span<const float> values(numbers.data() + i + first, count);
+    beyond +=
+        std::any_of(values.begin(), values.end(), [&](float v) { return v < least || v > most; });
+  }
+  return beyond == 0 ? ""
+                     : fmt::format(", {} ({} of {} Gaussians) are clamped", what, beyond,
+                                   numbers.size() / stride);
+}
+
+/// What of a model lies beyond what SPZ has codes for.
 std::string spz_clamped(const Gaussians& model) {
   const std::size_t stride = 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree));
   constexpr double most_color = 0.5 / kSpzColorScale;
-  std::size_t scales = 0, colors = 0, harmonics = 0;
-  for (std::size_t i = 0; i < model.size(); ++i) {
-    const auto beyond = [](std::span<const float> values, double least, double most) {
-      return std::any_of(values.begin(), values.end(),
-                         [&](float v) { return v < least || v > most; });
-    };
-    const std::span<const float> sh(&model.sh[stride * i], stride);
-    scales += beyond({&model.log_scales[3 * i], 3}, kSpzLeastLogScale, kSpzMostLogScale);
-    colors += beyond(sh.first(3), -most_color, most_color);
-    harmonics += beyond(sh.subspan(3), -1.0, 1.0);
-  }
+  return clamped("scales beyond 4.5e-5 to 380", model.log_scales, 3, 0, 3, kSpzLeastLogScale,
+                 kSpzMostLogScale) +
+         clamped("colours beyond +-3.33 in SH", model.sh, stride, 0, 3, -most_color, most_color) +
+         clamped("SH beyond +-1", model.sh, stride, 3, stride - 3, -1.0, 1.0);
+}
+
+/// A GLB holds sizes and opacities, of which reading takes logarithms and logits.
+std::string gltf_losses(const Gaussians& model) {
   std::string out;
-  const auto tell = [&](std::size_t count, const char* what) {
-    if (count > 0)
-      out += fmt::format(", {} ({} of {} Gaussians) are clamped", what, count, model.size());
-  };
-  tell(scales, "scales beyond 4.5e-5 to 380");
-  tell(colors, "colours beyond +-3.33 in SH");
-  tell(harmonics, "SH beyond +-1");
-  return out;
+  if (model.sh_degree > kSplattingMaxDegree)
+    out += fmt::format(", SH above degree {} is left out", kSplattingMaxDegree);
+  out += clamped("scales beyond 1e-30 to 2.4e17", model.log_scales, 3, 0, 3,
+                 std::log(kSplattingLeastScale), kMostLogScale);
+  out += clamped("opacities within 1e-7 of 0 or 1", model.opacities, 1, 0, 1, logit_of(0.0),
+                 logit_of(1.0));
+  return out.empty() ? kNoLoss : out.substr(2);
 }
 
 std::string spz_losses(const Gaussians& model) {
@@ -140,9 +159,7 @@ std::string losses(ModelFormat format, const Gaussians& model) {
               ? fmt::format(", SH above degree {} is left out", kSogMostDegree)
               : "");
     case ModelFormat::kGltf:
-      return model.sh_degree > kSplattingMaxDegree
-                 ? fmt::format("SH above degree {} is left out", kSplattingMaxDegree)
-                 : kNoLoss;
+      return gltf_losses(model);
     case ModelFormat::kUnknown:
       break;
   }

@@ -49,8 +49,9 @@ void write_ply_as_it_is(const std::filesystem::path& path,
 Gaussians read_gltf_gaussians(const std::filesystem::path& path, bool drop_nonfinite = false);
 /// Whether a glTF file holds Gaussians; it may hold meshes too. Throws as read_gltf().
 bool has_gltf_gaussians(const std::filesystem::path& path);
-/// GLB with floats: nothing is lost up to SH degree 3, what is above is left out. Throws DataError
-/// for more than the 4 GiB that a GLB can have.
+/// GLB with floats: nothing is lost up to SH degree 3 but in opacities within 1e-7 of 0 or 1 and
+/// scales beyond 1e-30 to 2.4e17; SH above is left out. Throws DataError for more than the 4 GiB
+/// that a GLB can have.
 void write_glb(const std::filesystem::path& path, const Gaussians& model);
 
 /// PlayCanvas' compressed PLY: chunks of 256 Gaussians in 16 bytes each, and SH in bytes.

@@ -16,6 +16,7 @@
 #include "io/text_reader.hpp"
 #include "io/texture_file.hpp"
 #include "raysplats/error.hpp"
+#include "util/file_kind.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -35,15 +36,28 @@ Rgb color_of(const float (&values)[3], float high) {
 
 bool is_black(const Rgb& color) { return color == Rgb{0, 0, 0}; }
 
-Material map_material(const tinyobj::material_t& mtl) {
+/// What tinyobjloader does not tell of a material.
+struct Named {
+  std::string name;
+  bool has_color = false;  // by Kd
+};
+
+Material map_material(const tinyobj::material_t& mtl, const Named& named) {
   Material material;
-  material.name = mtl.name;
-  material.color = color_of(mtl.diffuse, 1.0f);
+  material.name = named.name;
+  material.emission = color_of(mtl.emission, std::numeric_limits<float>::max());
+  // Without Kd tinyobjloader's depends on the materials before.
+  if (named.has_color) {
+    material.color = color_of(mtl.diffuse, 1.0f);
+  } else if (!mtl.diffuse_texname.empty()) {
+    material.color = {1, 1, 1};
+  } else if (!is_black(material.emission)) {
+    material.color = {0, 0, 0};
+  }
   const Rgb specular = color_of(mtl.specular, 1.0f);
   const Rgb filter = color_of(mtl.transmittance, 1.0f);
   const float dissolve = bounded(mtl.dissolve, 0.0f, 1.0f, 1.0f);
   const float ior = mtl.ior > 0.0f ? bounded(mtl.ior, 0.01f, 10.0f, 1.0f) : 1.0f;
-  material.emission = color_of(mtl.emission, std::numeric_limits<float>::max());
   // tinyobjloader's 0 0 0 is a filter that the file lacks; 1 1 1, which exporters write for opaque
   // materials too, filters nothing.
   const bool filters = !is_black(filter) && filter != Rgb{1, 1, 1};
@@ -82,9 +96,22 @@ std::string trimmed(std::string_view text) {
   return std::string(text.substr(first, text.find_last_not_of(kBlanks) - first + 1));
 }
 
-/// The text of a material file with numbers for the names of its materials, which go to `names`:
+/// A line in a form that tinyobjloader knows, which takes missing numbers for 0 and -halo for one.
+std::string completed(std::string_view line) {
+  std::istringstream words{std::string(line.substr(0, line.find('#')))};
+  std::string key, first, second;
+  words >> key >> first >> second;
+  const bool is_color = key == "Kd" || key == "Ks" || key == "Ke" || key == "Tf";
+  // One number is a grey.
+  if (is_color && !first.empty() && second.empty())
+    return fmt::format("{} {} {} {}", key, first, first, first);
+  if (key == "d" && first == "-halo") return fmt::format("d {}", second);
+  return std::string(line);
+}
+
+/// The text of a material file with numbers for the names of its materials, which go to `named`:
 /// some versions of tinyobjloader end a name at its first blank.
-std::string with_numbers(std::string_view text, std::vector<std::string>& names) {
+std::string with_numbers(std::string_view text, std::vector<Named>& named) {
   constexpr std::string_view kKey = "newmtl";
   std::string out;
   out.reserve(text.size());
@@ -99,10 +126,12 @@ std::string with_numbers(std::string_view text, std::vector<std::string>& names)
       if (rest.starts_with(' ') || rest.starts_with('\t')) name = trimmed(rest);
     }
     if (name.empty()) {
-      out += line;
+      if (!named.empty() && (rest.starts_with("Kd ") || rest.starts_with("Kd\t")))
+        named.back().has_color = true;
+      out += completed(line);
     } else {
-      out += fmt::format("{} {}", kKey, names.size());
-      names.push_back(std::move(name));
+      out += fmt::format("{} {}", kKey, named.size());
+      named.push_back({std::move(name)});
     }
     out += text.substr(end, 1);
     text.remove_prefix(std::min(end + 1, text.size()));
@@ -116,23 +145,31 @@ std::filesystem::path relative_to(const std::filesystem::path& file, std::string
   return (file.parent_path() / name).lexically_normal();
 }
 
+/// Of a texture: a comment may follow its name, which may have a # as well.
+std::filesystem::path texture_path(const std::filesystem::path& library, const std::string& name) {
+  const std::filesystem::path path = relative_to(library, name);
+  const std::size_t comment = std::min(name.find(" #"), name.find("\t#"));
+  return comment == std::string::npos || is_file(path)
+             ? path
+             : relative_to(library, trimmed(name.substr(0, comment)));
+}
+
 }  // namespace
 
 void MtlMaterials::add_library(std::string_view names) {
   const std::string whole = trimmed(names);
-  std::error_code error;
   // A name may hold blanks, although the format separates names by them.
-  if (std::filesystem::exists(relative_to(obj_, whole), error)) {
+  if (is_file(relative_to(obj_, whole))) {
     read_library(relative_to(obj_, whole));
     return;
   }
   std::istringstream words(whole);
   for (std::string name; words >> name;) {
     const std::filesystem::path path = relative_to(obj_, name);
-    if (std::filesystem::exists(path, error)) {
+    if (is_file(path)) {
       read_library(path);
     } else {
-      spdlog::warn("{}: the material file {} does not exist, so its materials are the default one",
+      spdlog::warn("{}: there is no material file {}, so its materials are the default one",
                    obj_.string(), path.string());
     }
   }
@@ -143,23 +180,21 @@ void MtlMaterials::read_library(const std::filesystem::path& path) {
   std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   // tinyobjloader would miss the first line.
   if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-  std::vector<std::string> names;
-  std::istringstream stream{with_numbers(text, names)};
+  std::vector<Named> named;
+  std::istringstream stream{with_numbers(text, named)};
   std::map<std::string, int> indices;
   std::vector<tinyobj::material_t> read;
   std::string warnings;
   std::string errors;
   tinyobj::LoadMtl(&indices, &read, &stream, &warnings, &errors);
   for (const tinyobj::material_t& mtl : read) {
-    std::size_t number = names.size();
+    std::size_t number = named.size();
     std::from_chars(mtl.name.data(), mtl.name.data() + mtl.name.size(), number);
-    if (number >= names.size() || known_.contains(names[number])) continue;
-    const std::string& name = names[number];
-    Material material = map_material(mtl);
-    material.name = name;
-    known_.emplace(name, std::move(material));
+    if (number >= named.size() || known_.contains(named[number].name)) continue;
+    const std::string& name = named[number].name;
+    known_.emplace(name, map_material(mtl, named[number]));
     const std::string map = trimmed(mtl.diffuse_texname);
-    if (!map.empty()) texture_paths_.emplace(name, relative_to(path, map));
+    if (!map.empty()) texture_paths_.emplace(name, texture_path(path, map));
     if (!trimmed(mtl.alpha_texname).empty()) cut_out_.insert(name);
   }
 }

@@ -20,7 +20,7 @@ namespace raysplats::io {
 ///
 /// | MTL | Material |
 /// | --- | --- |
-/// | Kd, map_Kd | colour, texture |
+/// | Kd, map_Kd | colour (without Kd white under a texture, black where Ke is), texture |
 /// | Ks, Ns (unless illum 1) | strength (mean) and width of the specular lobe |
 /// | illum 3, 5 | mirror of colour Ks (Kd where Ks is 0) |
 /// | illum 4, 6, 7, 9, or Ni > 1 with d < 1 or Tf not 1 | glass of index Ni and colour Tf |

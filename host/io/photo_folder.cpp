@@ -22,13 +22,18 @@ namespace fs = std::filesystem;
 constexpr std::array<const char*, 8> kFolderNames{"images", "image", "photos", "rgb",
                                                   "color",  "input", "frames", "resized_images"};
 
-/// Whether the folder has every photo of the model in the size of its camera.
-bool has_photos_of(const fs::path& folder, const ColmapModel& model) {
+/// Whether the folder has the photos of the model in the sizes of their cameras, all but
+/// `most_missing`.
+bool has_photos_of(const fs::path& folder,
+                   const ColmapModel& model,
+                   std::size_t most_missing,
+                   RespeltFinder& respelt) {
+  std::size_t missing = 0;
   return std::all_of(model.images.begin(), model.images.end(), [&](const ColmapImage& image) {
-    const auto photo = find_photo(folder, image.name);
-    if (!photo) return false;
+    const auto photo = find_photo(folder, image.name, respelt);
+    if (!photo) return ++missing <= most_missing;
     const Camera& camera = model.cameras.at(image.camera_id);
-    const ImageSize size = image_size(*photo);
+    const ImageSize size = image_size(photo->path);
     const bool upright = size.width == camera.width && size.height == camera.height;
     return upright || (size.width == camera.height && size.height == camera.width);
   });
@@ -36,11 +41,9 @@ bool has_photos_of(const fs::path& folder, const ColmapModel& model) {
 
 /// Whether the folder has any photo of the model.
 bool has_photo_of(const fs::path& folder, const ColmapModel& model, RespeltFinder& respelt) {
-  const auto is_there = [&](const ColmapImage& image) {
-    return find_photo(folder, image.name).has_value();
-  };
-  return std::any_of(model.images.begin(), model.images.end(), is_there) ||
-         (!model.images.empty() && respelt.find(folder, model.images.front().name));
+  return std::any_of(model.images.begin(), model.images.end(), [&](const ColmapImage& image) {
+    return find_photo(folder, image.name, respelt).has_value();
+  });
 }
 
 /// Where the photos are if the usual folder has none of them: reduced copies may have other names
@@ -60,17 +63,18 @@ std::optional<fs::path> fuller_folder(const fs::path& root,
 std::optional<fs::path> other_folder(const fs::path& root,
                                      const ColmapModel& model,
                                      RespeltFinder& respelt) {
-  if (model.images.empty() || find_photo(root, model.images.front().name)) return std::nullopt;
+  if (model.images.empty() || find_photo(root, model.images.front().name, respelt))
+    return std::nullopt;
   for (const char* name : kFolderNames) {
     auto folder = respelt.find_folder(root, name);
-    if (folder && find_photo(*folder, model.images.front().name)) return folder;
+    if (folder && find_photo(*folder, model.images.front().name, respelt)) return folder;
   }
   return std::nullopt;
 }
 
 std::size_t photos_in(const fs::path& folder, const ColmapModel& model, RespeltFinder& respelt) {
   const auto is_there = [&](const ColmapImage& image) {
-    return find_photo(folder, image.name) || respelt.find(folder, image.name);
+    return find_photo(folder, image.name, respelt).has_value();
   };
   return static_cast<std::size_t>(
       std::count_if(model.images.begin(), model.images.end(), is_there));
@@ -78,15 +82,18 @@ std::size_t photos_in(const fs::path& folder, const ColmapModel& model, RespeltF
 
 /// Looks at the first photo: warns where it is not as much smaller than that in `images`, or than
 /// its camera where there is none, as the name of its folder says.
-void warn_of_size(const PhotoFolder& copies, const fs::path& images, const ColmapModel& model) {
+void warn_of_size(const PhotoFolder& copies,
+                  const fs::path& images,
+                  const ColmapModel& model,
+                  RespeltFinder& respelt) {
   constexpr double kMostOff = 0.1;
   for (const ColmapImage& image : model.images) {
-    const auto photo = find_photo(copies.path, image.name);
+    const auto photo = find_photo(copies.path, image.name, respelt);
     if (!photo) continue;
     const Camera& camera = model.cameras.at(image.camera_id);
-    const auto whole = find_photo(images, image.name);
-    const ImageSize size = image_size(*photo);
-    const ImageSize full = whole ? image_size(*whole) : ImageSize{camera.width, camera.height};
+    const auto whole = find_photo(images, image.name, respelt);
+    const ImageSize size = image_size(photo->path);
+    const ImageSize full = whole ? image_size(whole->path) : ImageSize{camera.width, camera.height};
     // Either may be turned by a quarter.
     const double factor =
         static_cast<double>(std::max(full.width, full.height)) / std::max(size.width, size.height);
@@ -108,7 +115,7 @@ PhotoFolder fuller_copies(const PhotoFolder& copies,
   const std::size_t reduced = photos_in(copies.path, model, respelt);
   const std::size_t whole = photos_in(images, model, respelt);
   if (reduced >= whole) {
-    warn_of_size(copies, images, model);
+    warn_of_size(copies, images, model, respelt);
     return copies;
   }
   spdlog::warn("{} has {} of the {} photos of the model and {} has {}: those in images are used",
@@ -135,12 +142,15 @@ std::optional<PhotoFolder> reduced_copies(const fs::path& root, double downscale
   return chosen;
 }
 
-std::optional<fs::path> find_photo(const fs::path& folder, const fs::path& name) {
+std::optional<FoundPhoto> find_photo(const fs::path& folder,
+                                     const fs::path& name,
+                                     RespeltFinder& respelt) {
   for (const fs::path& candidate : {name, name.filename()}) {
-    if (is_file(folder / candidate)) return folder / candidate;
-    fs::path stem = candidate;
-    stem.replace_extension();
-    if (auto found = find_image(folder, stem)) return found;
+    if (auto found = find_image(folder, candidate)) return FoundPhoto{*found};
+    if (auto found = respelt.find(folder, candidate)) return FoundPhoto{*found, true};
+    // Models of raw photos have extensions that no picture has.
+    const fs::path any = fs::path(candidate).replace_extension(kImageExtensions.front());
+    if (auto found = find_reformatted(folder, any)) return FoundPhoto{*found, false, true};
   }
   return std::nullopt;
 }
@@ -165,10 +175,12 @@ PhotoFolder photo_folder(const fs::path& root, const ColmapModel& model, double 
   PhotoFolder usual = usual_photo_folder(root, downscale);
   const fs::path input = root / "input", images = root / "images";
   RespeltFinder respelt;
-  // Reduced copies are of `images`.
-  const bool has_usual = is_folder(images) ? has_photos_of(images, model) : usual.path != root;
+  // Reduced copies are of `images`. Photos that were deleted from it are left out.
+  const bool has_usual = is_folder(images)
+                             ? has_photos_of(images, model, model.images.size() / 2, respelt)
+                             : usual.path != root;
   std::optional<fs::path> found;
-  if (!has_usual && is_folder(input) && has_photos_of(input, model)) found = input;
+  if (!has_usual && is_folder(input) && has_photos_of(input, model, 0, respelt)) found = input;
   if (!found && usual.path == root) found = other_folder(root, model, respelt);
   if (!found && (found = fuller_folder(root, usual.path, model, respelt))) {
     spdlog::info("{} has no photo of the names in the model: those in {} are used",

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "io/colmap_model.hpp"
+#include "io/find_image.hpp"
 
 namespace raysplats::io {
 
@@ -24,7 +25,8 @@ std::optional<PhotoFolder> reduced_copies(const std::filesystem::path& root, dou
 /// Where the photos of a COLMAP model below the data set `root` lie: as usual_photo_folder(),
 /// `root` being where they lie beside the model. The photos that convert.py
 /// of 3DGS reads lie in `input`, and those that it makes of them, which are of another size and
-/// without a lens, in `images`: the model tells which are its own. Where neither is there, a folder
+/// without a lens, in `images`: the model tells which are its own, by the sizes of at least half of
+/// its photos. Where neither is there, a folder
 /// that other programs name (Images, rgb, resized_images of ScanNet++) and that has the model's
 /// first photo. Where the usual folder has none of the photos (reduced copies of other names), but
 /// `images` or the root has: that. Reduced copies that lack photos of `images` are not taken, and
@@ -33,9 +35,17 @@ PhotoFolder photo_folder(const std::filesystem::path& root,
                          const ColmapModel& model,
                          double downscale);
 
-/// The photo of a COLMAP image: by its whole name, by its last part, or with another extension
-/// (reduced copies are often stored in another format).
-std::optional<std::filesystem::path> find_photo(const std::filesystem::path& folder,
-                                                const std::filesystem::path& name);
+/// A photo, and in what its name is another than that which was sought.
+struct FoundPhoto {
+  std::filesystem::path path;
+  bool respelt = false;      ///< as RespeltFinder finds it
+  bool reformatted = false;  ///< with another extension
+};
+
+/// The photo of a COLMAP image, by its whole name or by its last part: spelt so, or otherwise, or
+/// the single one with another extension (reduced copies are often stored in another format).
+std::optional<FoundPhoto> find_photo(const std::filesystem::path& folder,
+                                     const std::filesystem::path& name,
+                                     RespeltFinder& respelt);
 
 }  // namespace raysplats::io

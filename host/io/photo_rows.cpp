@@ -326,9 +326,12 @@ bool shape_is_in_alpha(const std::vector<float>& values, const std::vector<float
 }  // namespace
 
 float MaskPlane::at(int x, int y, int photo_width, int photo_height) const {
-  const auto mask_x = static_cast<std::size_t>(static_cast<long>(x) * width / photo_width);
-  const auto mask_y = static_cast<std::size_t>(static_cast<long>(y) * height / photo_height);
-  return values[mask_y * static_cast<std::size_t>(width) + mask_x];
+  // The pixel below the centre of the photo's.
+  const auto place = [](int i, int size, int photo_size) {
+    return static_cast<std::size_t>((2 * std::int64_t{i} + 1) * size / (2 * photo_size));
+  };
+  return values[place(y, height, photo_height) * static_cast<std::size_t>(width) +
+                place(x, width, photo_width)];
 }
 
 MaskPlane mask_plane(const RawImage& mask) {

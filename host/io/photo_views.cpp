@@ -125,6 +125,15 @@ void refuse_shared_photo(const std::string& first,
       first, second, cameras, photo.string()));
 }
 
+void tell_of_extensions(std::size_t reformatted,
+                        std::size_t all,
+                        const fs::path& cameras,
+                        const std::string& first) {
+  if (reformatted == 0) return;
+  spdlog::info("{} of {} photos have another extension than {} says ('{}')", reformatted, all,
+               cameras.string(), first);
+}
+
 void tell_of_case(std::size_t respelt,
                   std::size_t all,
                   const fs::path& cameras,

@@ -43,6 +43,13 @@ void warn_of_principal_points(const std::vector<View>& views);
                                       const std::string& cameras,
                                       const std::filesystem::path& photo);
 
+/// Tells of photos that have another extension than the file of cameras says: so many of `all`,
+/// `first` as it has it.
+void tell_of_extensions(std::size_t reformatted,
+                        std::size_t all,
+                        const std::filesystem::path& cameras,
+                        const std::string& first);
+
 /// Tells of photos whose names another system wrote, to which letter case is all the same, or
 /// whether an accent is a character of its own: so many of `all`, `first` as the file of cameras
 /// has it.

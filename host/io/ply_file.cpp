@@ -85,6 +85,12 @@ bool PlyFile::has_later(std::string_view element) const {
                      [&](const LaterElement& each) { return each.name == element; });
 }
 
+std::uint64_t PlyFile::later_rows(std::string_view element) const {
+  const auto found = std::find_if(later_.begin(), later_.end(),
+                                  [&](const LaterElement& each) { return each.name == element; });
+  return found == later_.end() ? 0 : found->rows;
+}
+
 bool PlyFile::has_later(std::string_view element, std::string_view property) const {
   return std::any_of(later_.begin(), later_.end(), [&](const LaterElement& each) {
     return each.name == element &&

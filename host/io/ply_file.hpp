@@ -43,6 +43,8 @@ class PlyFile {
   /// The elements behind the table.
   bool has_later(std::string_view element) const;
   bool has_later(std::string_view element, std::string_view property) const;
+  /// Rows of an element behind the table; 0 without it.
+  std::uint64_t later_rows(std::string_view element) const;
   /// What follows a word in the first comment that begins with it; "" without one.
   std::string comment(std::string_view word) const;
 

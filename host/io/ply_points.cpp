@@ -84,14 +84,17 @@ PlyPoints read_ply_points(const std::filesystem::path& path) {
       points.colors.push_back(static_cast<float>(value));
     }
   });
-  if (left_out > 0) {
-    spdlog::warn("{}: {} of {} points have a coordinate that is not finite and are left out",
-                 path.string(), left_out, file.rows());
-  }
+  warn_of_points(path, left_out, file.rows());
   // Floating-point and int colours state no range: more than 1 means 0 to 255.
   const float divisor = brightest > 1.0 ? 255.0f : 1.0f;
   for (float& value : points.colors) value = std::clamp(value / divisor, 0.0f, 1.0f);
   return out;
+}
+
+void warn_of_points(const std::filesystem::path& path, std::size_t left_out, std::size_t all) {
+  if (left_out == 0) return;
+  spdlog::warn("{}: {} of {} points have a coordinate that is not finite and are left out",
+               path.string(), left_out, all);
 }
 
 }  // namespace raysplats::io

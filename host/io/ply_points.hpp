@@ -20,4 +20,7 @@ struct PlyPoints {
 /// as read_ply() does.
 PlyPoints read_ply_points(const std::filesystem::path& path);
 
+/// Warns of points of a file that are left out because they are not finite, if there are any.
+void warn_of_points(const std::filesystem::path& path, std::size_t left_out, std::size_t all);
+
 }  // namespace raysplats::io

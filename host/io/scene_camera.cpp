@@ -51,9 +51,19 @@ void read_lens(io::TomlTable& table, SceneCamera& camera) {
       camera.principal_point = glm::dvec2((*point)[0], (*point)[1]);
     }
   }
-  Distortion& d = camera.distortion;
   const bool brown = camera.model == CameraModel::kOpenCv;
+  const bool parallel = camera.model == CameraModel::kOrthographic;
+  const bool around = camera.model == CameraModel::kEquirectangular;
+  table.only_for("extent", parallel, "model = \"orthographic\"");
+  for (const char* key : {"fov", "focal"})
+    table.only_for(key, !parallel && !around, "the models pinhole, opencv and fisheye");
+  table.only_for("principal-point", !around, "every model but equirectangular");
+  for (const char* key : {"k1", "k2", "k3"})
+    table.only_for(key, brown || is_wide(camera.model), "the models opencv and fisheye");
+  for (const char* key : {"p1", "p2"}) table.only_for(key, brown, "model = \"opencv\"");
+  table.only_for("k4", is_wide(camera.model), "model = \"fisheye\"");
   if (!brown && !is_wide(camera.model)) return;
+  Distortion& d = camera.distortion;
   for (const auto& [key, target] :
        {std::pair{"k1", &d.k1}, std::pair{"k2", &d.k2}, std::pair{"k3", &d.k3}}) {
     table.number(key, *target, -100.0, 100.0);
@@ -67,9 +77,7 @@ void read_lens(io::TomlTable& table, SceneCamera& camera) {
 }
 
 void read_orbit(io::TomlTable table, SceneCamera& camera) {
-  if (const auto frames = table.number("frames", 1, kMaxFrames)) {
-    camera.frames = static_cast<int>(*frames);
-  }
+  if (table.has("frames")) table.number("frames", camera.frames.emplace(), 1, kMaxFrames);
   camera.elevation = table.number("elevation", -89.9, 89.9);
   camera.distance = table.number("distance", 1e-9, kHuge);
   camera.target = table.vector("target");
@@ -193,7 +201,8 @@ std::vector<Camera> on_orbit(const SceneCamera& camera,
   }
   if (camera.up) shape.up = *camera.up;
   if (camera.width) shape.width = *camera.width;
-  if (camera.file.empty()) shape.height = default_height(camera, shape.width);
+  if (camera.file.empty() || camera.model == CameraModel::kEquirectangular)
+    shape.height = default_height(camera, shape.width);
   if (camera.height) shape.height = *camera.height;
   if (camera.elevation) shape.elevation_degrees = *camera.elevation;
   if (camera.distance) shape.distance = *camera.distance;
@@ -268,6 +277,16 @@ SceneCamera read_scene_camera(io::TomlTable& table) {
       }
     }
   }
+  const bool views = camera.source == Source::kData;
+  for (const char* key : {"split", "test-every", "undistort"})
+    table.only_for(key, views, "the views of 'data'");
+  table.only_for("views", views || file, "'file' and the views of 'data'");
+  table.only_for("downscale", file || data, "'file' and 'data'");
+  for (const char* key : {"up", "width", "height", "model", "fov", "focal", "extent",
+                          "principal-point", "k1", "k2", "k3", "k4", "p1", "p2"}) {
+    table.only_for(key, camera.position || orbit, "'position' and 'orbit'");
+  }
+  table.only_for("target", camera.position.has_value(), "'position': an orbit has orbit.target");
   table.finish();
   return camera;
 }

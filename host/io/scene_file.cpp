@@ -8,7 +8,6 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/matrix.hpp>
 #include <initializer_list>
-#include <tuple>
 
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
@@ -114,9 +113,9 @@ SceneMesh read_mesh_entry(TomlTable& table) {
                                    {{"file", SceneMesh::Normals::kFile},
                                     {"smooth", SceneMesh::Normals::kSmooth},
                                     {"flat", SceneMesh::Normals::kFlat}});
-  if (mesh.normals == SceneMesh::Normals::kSmooth) {
-    table.number("crease-angle", mesh.crease_angle, 0, 180);
-  }
+  const bool smooth = mesh.normals == SceneMesh::Normals::kSmooth;
+  if (smooth) table.number("crease-angle", mesh.crease_angle, 0, 180);
+  table.only_for("crease-angle", smooth, "normals = \"smooth\"");
   mesh.move = table.vector("move").value_or(mesh.move);
   if (auto turn = table.table("turn")) {
     const auto axis = turn->direction("axis");
@@ -165,17 +164,15 @@ SceneMaterial read_material(TomlTable& table) {
   const auto is = [&](std::initializer_list<Kind> kinds) {
     return std::find(kinds.begin(), kinds.end(), m.kind) != kinds.end();
   };
-  const std::tuple<const char*, const char*, bool> of_kinds[] = {
-      {"color", "a kind other than emissive, which has 'emission'", !is({Kind::kEmissive})},
-      {"texture", "a kind other than emissive", !is({Kind::kEmissive})},
-      {"specular", "the kinds diffuse and transparent", lit},
-      {"roughness", "the kinds diffuse, transparent and mirror", lit || is({Kind::kMirror})},
-      {"ior", "kind = \"glass\"", is({Kind::kGlass})},
-      {"absorption", "kind = \"glass\"", is({Kind::kGlass})},
-      {"opacity", "kind = \"transparent\"", is({Kind::kTransparent})}};
-  for (const auto& [key, kinds, used] : of_kinds) {
-    if (!used && table.has(key)) table.fail(key, fmt::format("'{}' is for {}", key, kinds));
-  }
+  table.only_for("color", !is({Kind::kEmissive}),
+                 "a kind other than emissive, which has 'emission'");
+  table.only_for("texture", !is({Kind::kEmissive}), "a kind other than emissive");
+  table.only_for("specular", lit, "the kinds diffuse and transparent");
+  table.only_for("roughness", lit || is({Kind::kMirror}),
+                 "the kinds diffuse, transparent and mirror");
+  table.only_for("ior", is({Kind::kGlass}), "kind = \"glass\"");
+  table.only_for("absorption", is({Kind::kGlass}), "kind = \"glass\"");
+  table.only_for("opacity", is({Kind::kTransparent}), "kind = \"transparent\"");
   table.vector("emission", m.emission, 0, kMaxColor);
   if (const auto shadow = table.number("shadow", 0, 1)) m.shadow = static_cast<float>(*shadow);
   table.finish();
@@ -200,7 +197,11 @@ Light read_light(TomlTable& table) {
   float intensity = 1.0f;
   table.number("intensity", intensity, 0, kHuge);
   for (float& c : light.color) c *= intensity;
-  if (light.kind == Light::Kind::kSphere) table.number("radius", light.radius, 0, kHuge);
+  const bool sphere = light.kind == Light::Kind::kSphere;
+  if (sphere) table.number("radius", light.radius, 0, kHuge);
+  table.only_for("radius", sphere, "kind = \"sphere\"");
+  table.only_for("direction", distant, "kind = \"directional\"");
+  table.only_for("position", !distant, "the kinds point and sphere");
   table.finish();
   return light;
 }

@@ -12,6 +12,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -50,6 +51,7 @@ struct Loaded {
   Mesh mesh;
   std::vector<std::string> material_names;
   std::uint32_t first = 0;
+  std::vector<bool> bare;  ///< as MeshFile::bare
 };
 
 /// Adds materials with their textures to the scene.
@@ -105,6 +107,40 @@ bool is_seen(const SceneFile& file, const std::filesystem::path& mesh, const std
   });
 }
 
+/// Takes textures off triangles without texture coordinates, which would show one texel of them,
+/// and warns of that once of every file.
+class PlainMaterials {
+ public:
+  /// Gives `bare` triangles copies of their materials without textures: one of every material,
+  /// whatever meshes have it.
+  void put(const SceneMesh& entry,
+           const std::vector<bool>& bare,
+           Mesh& mesh,
+           std::vector<Material>& materials) {
+    std::optional<std::uint32_t> first;
+    for (std::size_t i = 0; i < bare.size(); ++i) {
+      const std::uint32_t material = mesh.materials[i];
+      if (!bare[i] || materials[material].texture < 0) continue;
+      if (!first) first = material;
+      const auto [copy, added] =
+          copies_.emplace(material, static_cast<std::uint32_t>(materials.size()));
+      if (added) {
+        materials.push_back(materials[material]);
+        materials.back().texture = -1;
+      }
+      mesh.materials[i] = copy->second;
+    }
+    if (!first || !told_.insert(entry.file).second) return;
+    spdlog::warn(
+        "{}: the texture of the material '{}' is left out where there are no texture coordinates",
+        entry.file.string(), materials[*first].name);
+  }
+
+ private:
+  std::map<std::uint32_t, std::uint32_t> copies_;
+  std::set<std::filesystem::path> told_;  ///< files
+};
+
 /// Whether light is bent or absorbed within a body.
 bool has_inside(const Material& material) {
   return material.kind == Material::Kind::kGlass &&
@@ -149,6 +185,7 @@ void load_meshes(const SceneFile& file, LoadedScene& out) {
   const std::size_t own = out.scene.materials.size();
   std::map<std::filesystem::path, Loaded> read;
   OpenGlass open_glass;
+  PlainMaterials plain;
   for (const SceneMesh& entry : file.meshes) {
     auto found = read.find(entry.file);
     if (found == read.end()) {
@@ -156,6 +193,7 @@ void load_meshes(const SceneFile& file, LoadedScene& out) {
           entry.file, [&](const std::string& name) { return is_seen(file, entry.file, name); });
       Loaded loaded;
       loaded.mesh = std::move(source.mesh);
+      loaded.bare = std::move(source.bare);
       for (const Material& each : source.materials) loaded.material_names.push_back(each.name);
       loaded.first = append(out.scene, std::move(source.materials), std::move(source.textures));
       found = read.emplace(entry.file, std::move(loaded)).first;
@@ -163,6 +201,7 @@ void load_meshes(const SceneFile& file, LoadedScene& out) {
     Mesh mesh = found->second.mesh;
     const std::vector<std::uint32_t> map = material_map(entry, found->second, out.scene, own);
     for (std::uint32_t& material : mesh.materials) material = map.at(material);
+    plain.put(entry, found->second.bare, mesh, out.scene.materials);
     open_glass.warn(entry, mesh, out.scene.materials);
     if (entry.normals == SceneMesh::Normals::kFlat) mesh.normals.clear();
     if (entry.normals == SceneMesh::Normals::kSmooth) {

@@ -25,8 +25,6 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr const char* kMeta = "meta.json";
-/// Gaussians that a byte on the disk may stand for; real ones take 8 to 16 bytes.
-constexpr std::uint64_t kMostPerByte = 8;
 /// Bytes of meta.json; real ones have some ten thousand, and parsed text takes more than its bytes.
 constexpr std::size_t kMostMeta = std::size_t{1} << 20;
 /// Texels that a texture may have beyond those in use.
@@ -126,7 +124,7 @@ class Reader {
     }
     // A few bytes can stand for any number of equal texels: neither the model nor a texture gets
     // memory before the count is borne out by the disk and by the header of every picture.
-    if (count_ > kAlwaysHeld && count_ > saturating_product(files_.disk_bytes(), kMostPerByte)) {
+    if (count_ > kAlwaysHeld && count_ > saturating_product(files_.disk_bytes(), kSogMostPerByte)) {
       fail(fmt::format("it declares {} Gaussians, more than {} bytes can hold", count_,
                        files_.disk_bytes()));
     }

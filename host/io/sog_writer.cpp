@@ -21,6 +21,7 @@
 #include "scene/morton_order.hpp"
 #include "scene/quantization.hpp"
 #include "util/atomic_file.hpp"
+#include "util/stop_if_interrupted.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -178,15 +179,26 @@ void write_sog(const std::filesystem::path& path, const Gaussians& given) {
   NamedFiles files(1);
   Json meta{{"version", kSogVersion},
             {"asset", {{"generator", "RaySplats-CL " RAYSPLATS_VERSION}}},
-            {"count", model.size()},
-            {"means", add_means(model, files)},
-            {"scales", add_scales(model, files)},
-            {"quats", add_rotations(model, files)},
-            {"sh0", add_colors(model, files)}};
-  if (model.sh_degree > 0 && model.size() > 0) meta["shN"] = add_harmonics(model, files);
+            {"count", model.size()}};
+  const auto add = [&](const char* name, Json (*part)(const Gaussians&, NamedFiles&)) {
+    stop_if_interrupted();
+    meta[name] = part(model, files);
+  };
+  add("means", add_means);
+  add("scales", add_scales);
+  add("quats", add_rotations);
+  add("sh0", add_colors);
+  if (model.sh_degree > 0 && model.size() > 0) add("shN", add_harmonics);
+  stop_if_interrupted();
   const std::string text = meta.dump();
   const auto* bytes = reinterpret_cast<const std::byte*>(text.data());
   files.front() = {"meta.json", {bytes, bytes + text.size()}};
+  // Equal Gaussians pack to next to nothing, which reading does not take for so many.
+  std::size_t packed = 0;
+  for (const auto& [name, content] : files) packed += content.size();
+  const std::size_t least = model.size() / kSogMostPerByte + 1;
+  if (model.size() > kAlwaysHeld && packed < least)
+    files.emplace_back("padding", std::vector<std::byte>(least - packed));
   const std::vector<std::byte> archive = zip_of(files, path);
   AtomicFile file(path);
   file.write(archive.data(), archive.size());

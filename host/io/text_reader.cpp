@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <charconv>
+#include <cmath>
 
 #include "raysplats/error.hpp"
 
@@ -22,7 +23,14 @@ bool parse(std::string_view token, T& value) {
 
 }  // namespace
 
-bool parse_number(std::string_view token, double& value) { return parse(token, value); }
+bool parse_number(std::string_view token, double& value) {
+  if (parse(token, value)) return true;
+  // from_chars does not say on which side of its range a number lies.
+  long double wide = 0;
+  if (!parse(token, wide) || std::abs(wide) > 1) return false;
+  value = 0;
+  return true;
+}
 bool parse_number(std::string_view token, std::uint64_t& value) { return parse(token, value); }
 bool parse_number(std::string_view token, std::int32_t& value) { return parse(token, value); }
 

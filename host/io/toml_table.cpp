@@ -18,6 +18,7 @@ namespace raysplats::io {
 namespace {
 
 constexpr std::uint64_t kMaxBytes = std::uint64_t{16} << 20;
+constexpr std::size_t kMaxKeyParts = 64;
 constexpr double kMaxInt = std::numeric_limits<int>::max();
 
 /// What a range accepts, after "a number" or "three numbers"; "" where it accepts all.
@@ -53,19 +54,60 @@ std::size_t string_end(std::string_view text, std::size_t begin) {
   return text.size();
 }
 
-/// TOML has letters beyond ASCII in strings and comments alone. toml++ 3.1 takes some of them
-/// elsewhere to where its authors say that no program gets (is_non_ascii_horizontal_whitespace).
-void check_ascii(std::string_view text, const std::filesystem::path& path) {
+/// The parts of the keys around a place outside of strings and comments.
+class KeyDepth {
+ public:
+  /// Of the place behind the letter.
+  std::size_t behind(char letter) {
+    if (letter == '.') {
+      ++dots_;
+    } else if (letter == '=') {
+      key_ = dots_ + 1;
+      dots_ = 0;
+    } else if (letter == '{' || letter == '[') {
+      open_.push_back(outer_);
+      outer_ += key_;
+      key_ = dots_ = 0;
+    } else if (letter == '}' || letter == ']') {
+      if (!open_.empty()) {
+        outer_ = open_.back();
+        open_.pop_back();
+      }
+      key_ = dots_ = 0;
+    } else if (letter == ',' || letter == '\n') {
+      key_ = dots_ = 0;
+    }
+    return outer_ + dots_ + 1;
+  }
+
+ private:
+  std::vector<std::size_t> open_;  // outer_ before each open brace or bracket
+  std::size_t outer_ = 0;          // of the keys that these belong to
+  std::size_t key_ = 0;            // of the one whose value it is
+  std::size_t dots_ = 0;           // one in numbers and dates
+};
+
+/// Refuses what toml++ 3.1 is not safe from. TOML has letters beyond ASCII in strings and comments
+/// alone, and some of them get elsewhere to where its authors say that no program gets
+/// (is_non_ascii_horizontal_whitespace). Each part of a key is a table in a table, which are
+/// destroyed one within the other.
+void check_text(std::string_view text, const std::filesystem::path& path) {
+  KeyDepth depth;
   std::size_t i = text.starts_with("\xef\xbb\xbf") ? 3 : 0;
+  const auto fail = [&](const std::string& what) {
+    throw UsageError(fmt::format(
+        "{}, line {}: {}", path.string(),
+        1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(i), '\n'), what));
+  };
   while (i < text.size()) {
     if (text[i] == '#') {
       i = std::min(text.find('\n', i), text.size());
     } else if (text[i] == '"' || text[i] == '\'') {
       i = string_end(text, i);
     } else if ((static_cast<unsigned char>(text[i]) & 0x80u) != 0) {
-      throw UsageError(fmt::format(
-          "{}, line {}: a letter beyond ASCII stands outside of quotes", path.string(),
-          1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(i), '\n')));
+      fail("a letter beyond ASCII stands outside of quotes");
+    } else if (depth.behind(text[i]) > kMaxKeyParts) {
+      fail(fmt::format("a key has more than {} parts: write a shorter one", kMaxKeyParts));
     } else {
       ++i;
     }
@@ -125,7 +167,7 @@ std::string read_toml_text(const std::filesystem::path& path) {
 }
 
 toml::table parse_toml(std::string_view text, const std::filesystem::path& path) {
-  check_ascii(text, path);
+  check_text(text, path);
   try {
     return toml::parse(text, path.string());
   } catch (const toml::parse_error& error) {
@@ -184,6 +226,10 @@ void TomlTable::not_one_of(std::string_view key,
                            const std::string& value,
                            const std::vector<std::string>& names) const {
   fail(key, fmt::format("'{}' in {} is {}, not '{}'", key, name_, fmt::join(names, " or "), value));
+}
+
+void TomlTable::only_for(std::string_view key, bool used, std::string_view what) {
+  if (!used && has(key)) fail(key, fmt::format("'{}' is for {}", key, what));
 }
 
 bool TomlTable::has(std::string_view key) { return take(key) != nullptr; }

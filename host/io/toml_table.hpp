@@ -30,7 +30,7 @@ namespace raysplats::io {
 namespace raysplats::io {
 
 /// Parses a TOML file. Throws DataError when it cannot be read, UsageError with the line when it is
-/// no TOML.
+/// no TOML or a key has more than 64 parts, those of inline tables around it included.
 toml::table read_toml(const std::filesystem::path& path);
 /// The same of a text; `path` is named in errors.
 toml::table parse_toml(std::string_view text, const std::filesystem::path& path);
@@ -54,6 +54,8 @@ class TomlTable {
   TomlTable(const toml::table& table, const std::filesystem::path& file, std::string name);
 
   bool has(std::string_view key);
+  /// Refuses a key that is there but has no use: it "is for" something else.
+  void only_for(std::string_view key, bool used, std::string_view what);
   /// Reads a number into `target` if the key is there; whole ones for integer types.
   void number(std::string_view key, double& target, double low, double high);
   void number(std::string_view key, float& target, double low, double high);

@@ -73,21 +73,21 @@ struct Scope {
     }
     return static_cast<int>(*value);
   }
-  std::optional<double> angle(const char* key) const {
-    const auto value = number(key);
-    if (value && !(*value > 0 && *value < std::numbers::pi)) {
-      fail(fmt::format("'{}' is {}, which is no angle between 0 and pi", key, *value));
-    }
-    return value;
-  }
   /// Of radians, else of degrees.
   std::optional<double> angle(const char* radians, const char* degrees) const {
-    if (const auto value = angle(radians)) return value;
-    const auto value = number(degrees);
-    if (value && !(*value > 0 && *value < 180)) {
-      fail(fmt::format("'{}' is {}, which is no angle between 0 and 180 degrees", degrees, *value));
-    }
+    if (const auto value = positive(radians)) return value;
+    const auto value = positive(degrees);
     return value ? std::optional(*value * kDegree) : std::nullopt;
+  }
+  /// Whether it is true, or 1 as some programs write it.
+  bool flag(const char* key) const {
+    const auto found = object.find(key);
+    if (found == object.end() || found->is_null()) return false;
+    if (found->is_boolean()) return found->get<bool>();
+    const std::optional<double> value = number_of(*found);
+    if (!value || (*value != 0 && *value != 1))
+      fail(fmt::format("'{}' is neither true nor false", key));
+    return *value == 1;
   }
 };
 
@@ -102,8 +102,7 @@ void read_model(const Scope& scope, TransformsFrame& frame) {
     }
     frame.model = *model;
   }
-  const auto fisheye = scope.object.find("is_fisheye");
-  if (fisheye != scope.object.end() && *fisheye == true) frame.model = CameraModel::kFisheye;
+  if (scope.flag("is_fisheye")) frame.model = CameraModel::kFisheye;
 }
 
 /// nerfstudio's list of parameters: k1 to k4, p1 and p2, or the twelve of FISHEYE624.
@@ -170,18 +169,17 @@ void read_own_intrinsics(const Scope& scope, TransformsFrame& frame) {
 
 /// The signs that make the columns of the file's matrices right, down and forward. As a rule these
 /// are right, up and backward, as OpenGL has them.
-glm::dvec3 axis_signs(const json& root, const fs::path& path) {
-  const auto from_na = root.find("from_na");
-  if (from_na != root.end() && *from_na == true) {
+glm::dvec3 axis_signs(const Scope& scope) {
+  if (scope.flag("from_na")) {
     spdlog::info("{} has from_na, as NeuS2 writes it: its cameras have y down and z forward",
-                 path.string());
+                 scope.path.string());
     return {1, 1, 1};
   }
-  if (root.contains("normal_mts_args")) {
+  if (scope.object.contains("normal_mts_args")) {
     spdlog::info(
         "{} has normal_mts_args, as instant-ngp reads it: its cameras are Mitsuba's, with x to the "
         "left and z forward",
-        path.string());
+        scope.path.string());
     return {-1, -1, 1};
   }
   return {1, -1, -1};
@@ -304,7 +302,7 @@ TransformsFile parse_transforms(const json& root, const fs::path& path) {
   if (frames == root.end() || !frames->is_array()) {
     throw DataError(fmt::format("{} has no list of frames: it is no camera file", path.string()));
   }
-  const glm::dvec3 signs = axis_signs(root, path);
+  const glm::dvec3 signs = axis_signs(scope);
   std::size_t scaled = 0;
   for (const json& object : *frames) {
     const Scope frame_scope{object, path, fmt::format("frame {}", file.frames.size())};

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 #include <span>
 
@@ -20,13 +21,19 @@ namespace {
 using nlohmann::json;
 
 /// Focal lengths across and down, as far as the frame has them, in pixels of its own size. Angles
-/// are those of planes alone.
-std::array<std::optional<double>, 2> focal_lengths(const TransformsFrame& frame,
+/// are those of planes alone, which show no half of the world.
+std::array<std::optional<double>, 2> focal_lengths(const TransformsFile& file,
+                                                   const TransformsFrame& frame,
                                                    double width,
                                                    double height) {
   if (frame.fx || frame.fy || frame.model != CameraModel::kPinhole) return {frame.fx, frame.fy};
-  const auto focal = [](double side, const std::optional<double>& angle) {
-    return angle ? std::optional(0.5 * side / std::tan(0.5 * *angle)) : std::nullopt;
+  const auto focal = [&](double side, const std::optional<double>& angle) -> std::optional<double> {
+    if (!angle) return std::nullopt;
+    if (*angle < std::numbers::pi) return 0.5 * side / std::tan(0.5 * *angle);
+    throw DataError(fmt::format(
+        "{}: frame {} has an angle of view of {:.6g} degrees, but no plane shows 180 degrees or "
+        "more: give the camera_model and fl_x of its lens, in it or in the file",
+        file.path.string(), frame.number, *angle * 180.0 / std::numbers::pi));
   };
   return {focal(width, frame.angle_x), focal(height, frame.angle_y)};
 }
@@ -64,7 +71,7 @@ Camera frame_camera(const TransformsFile& file, std::size_t index, int width, in
     set_equirectangular(camera);
     return camera;
   }
-  const auto [fx, fy] = focal_lengths(frame, nominal_width, nominal_height);
+  const auto [fx, fy] = focal_lengths(file, frame, nominal_width, nominal_height);
   if (!fx && !fy) {
     throw DataError(fmt::format(
         "{}: frame {} has {}, in it or in the file", file.path.string(), frame.number,

@@ -13,7 +13,8 @@ namespace raysplats::io {
 /// and of one focal length or angle alone it makes square pixels.
 /// kPhotoLens for FISHEYE624 and for what nerfstudio reads beyond OpenCV's lenses: k4 of planes, p1
 /// and p2 of fisheyes, fisheye_crop_radius.
-/// Throws DataError when the frame has no focal length or angle (equirectangular frames need none).
+/// Throws DataError when the frame has no focal length or angle (equirectangular frames need none),
+/// or only an angle that no plane has.
 Camera frame_camera(const TransformsFile& file, std::size_t frame, int width, int height);
 
 /// The keys that tell a camera's model, principal point and distortion; those of kPhotoLens, which

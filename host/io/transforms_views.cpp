@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <string>
@@ -127,7 +128,8 @@ std::vector<FramePhoto> frame_photos(TransformsFile& file) {
 double other_focal_length(const TransformsFrame& frame, const Camera& camera) {
   constexpr double kClearly = 1.2;
   if (!frame.fx || !frame.angle_x || frame.model != CameraModel::kPinhole) return 0;
-  const double focal = 0.5 * camera.width / std::tan(0.5 * *frame.angle_x);
+  const double focal =
+      0.5 * camera.width / std::tan(0.5 * std::min(*frame.angle_x, std::numbers::pi));
   return std::max(focal, camera.fx) > kClearly * std::min(focal, camera.fx) ? focal : 0;
 }
 
@@ -190,6 +192,9 @@ std::vector<View> transforms_views(TransformsFile& file,
     fs::path name = frame.file_path;
     if (photos[i].moved) {
       name = photo.lexically_relative(folder.lexically_normal());
+      // Where a link and ".." lead to the folder, find_image() says its own name.
+      if (name.empty() || *name.begin() == "..")
+        name = photo.lexically_relative(fs::canonical(folder));
       if (moved++ == 0) first_moved = frame.file_path;
     }
     if (photos[i].respelt && respelt++ == 0) first_respelt = frame.file_path;
@@ -216,10 +221,7 @@ std::vector<View> transforms_views(TransformsFile& file,
     spdlog::info("{} of {} photos are not where {} says ({}) but were found below its folder",
                  moved, views.size(), file.path.string(), first_moved);
   }
-  if (reformatted > 0) {
-    spdlog::info("{} of {} photos have another extension than {} says ('{}')", reformatted,
-                 views.size(), file.path.string(), first_reformatted);
-  }
+  tell_of_extensions(reformatted, views.size(), file.path, first_reformatted);
   tell_of_case(respelt, views.size(), file.path, first_respelt);
   return views;
 }

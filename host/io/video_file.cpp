@@ -118,9 +118,11 @@ std::unique_ptr<VideoFile> open_video(const std::filesystem::path& path,
                     path.string()));
   }
   const double most = gif ? io::kMostGifFps : kMostFps;
-  if (!(options.fps > 0.0 && options.fps <= most)) {
-    throw UsageError(fmt::format("{} frames a second are out of range for {}: use up to {}",
-                                 options.fps, path.string(), most));
+  const double least = gif ? io::kLeastGifFps : extension == ".apng" ? kLeastApngFps : 0.0;
+  if (!(options.fps > 0.0 && options.fps >= least && options.fps <= most)) {
+    throw UsageError(fmt::format("{} frames a second are out of range for {}: use {}up to {}",
+                                 options.fps, path.string(),
+                                 least > 0.0 ? fmt::format("{:.4g} or more, ", least) : "", most));
   }
   if (gif) return std::make_unique<Gif>(path, options);
   if (extension == ".apng") return open_apng(path, options);

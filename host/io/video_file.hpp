@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 
@@ -20,6 +21,9 @@ class VideoFile {
   virtual void add(const Image& frame) = 0;
   virtual void finish() = 0;
 };
+
+/// Fewest frames a second of an animated PNG: one stays for 65535 ms at most.
+constexpr double kLeastApngFps = 1000.0 / UINT16_MAX;
 
 struct VideoOptions {
   double fps = 30.0;

@@ -47,15 +47,17 @@ ViewRows::ViewRows(const View& view) {
     mask_ = mask_plane(mask_of_photo(view, photo.turned));
     unchanged_ = false;
   }
-  auto pixels = decoded_rows(raw_, masked ? &mask_ : nullptr, colors);
-  if (has_border(raw_, view)) {
-    pixels = bordered_rows(std::move(pixels), view.border);
-    unchanged_ = false;
-  }
-  rows_ = fitted(std::move(pixels), view);
-  if (masked && view.mask_apart) {
-    weights_ = fitted(mask_rows(mask_, raw_.width, raw_.height), view);
-  }
+  const bool bordered = has_border(raw_, view);
+  const auto pixels = [&](const MaskPlane* mask) {
+    auto decoded = decoded_rows(raw_, mask, colors);
+    return bordered ? bordered_rows(std::move(decoded), view.border) : std::move(decoded);
+  };
+  if (bordered || view.mask_apart) unchanged_ = false;
+  rows_ = fitted(pixels(masked ? &mask_ : nullptr), view);
+  if (!view.mask_apart) return;
+  // Beside a mask that says what is background, what the photo itself shows is all that counts.
+  const bool ignores = masked && !view.mask_cuts;
+  weights_ = fitted(ignores ? mask_rows(mask_, raw_.width, raw_.height) : pixels(nullptr), view);
 }
 
 // Takes the lens out of a picture and gives it the view's size.

@@ -31,7 +31,8 @@ std::vector<double> contributions(Context& context,
                                   const Gaussians& model,
                                   std::span<const Camera> cameras,
                                   TraceOptions trace,
-                                  const Mirrors& mirrors) {
+                                  const Mirrors& mirrors,
+                                  const std::function<bool(double)>& within) {
   if (cameras.empty()) throw UsageError("Contributions are to the pictures of views: give cameras");
   trace.background = {};
   trace.sky = {};
@@ -40,11 +41,18 @@ std::vector<double> contributions(Context& context,
   Tracer tracer(context, trace, mirrors);
   const std::vector<std::size_t> views = even_choice(cameras.size(), kMostContributionViews);
   std::vector<double> out(model.size());
+  std::function<bool(double)> watch;
+  double done = 0;  // views
+  if (within) {
+    watch = [&](double share) {
+      return within((done + share) / static_cast<double>(views.size()));
+    };
+  }
   for (const std::size_t v : views) {
     const Camera& view = cameras[v];
     const double pixels = static_cast<double>(view.width) * view.height;
     const Camera camera = downscaled(view, std::max(1.0, std::sqrt(pixels / kMostPixels)));
-    tracer.render(on_device, camera, true);
+    if (tracer.render(on_device, camera, true, watch).data.empty()) return {};
     // The derivative of the picture's red by a Gaussian's is the sum of its shares.
     Image of_red(camera.width, camera.height, 4);
     for (std::size_t i = 0; i < of_red.pixels(); ++i) of_red.data[4 * i] = 1.0f;
@@ -52,6 +60,7 @@ std::vector<double> contributions(Context& context,
     const double share = 1.0 / (RS_SH0 * static_cast<double>(of_red.pixels() * views.size()));
     for (std::size_t i = 0; i < out.size(); ++i)
       out[i] += share * static_cast<double>(gradient.sh[3 * i]);
+    ++done;
   }
   return out;
 }

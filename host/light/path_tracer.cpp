@@ -17,6 +17,7 @@
 #include "light/surface_store.hpp"
 #include "parallel/scan.hpp"
 #include "raysplats/error.hpp"
+#include "scene/camera_check.hpp"
 #include "scene/gaussian_check.hpp"
 #include "scene/pixel_count.hpp"
 #include "scene/pixel_places.hpp"

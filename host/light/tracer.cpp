@@ -90,6 +90,45 @@ class Watch {
   bool stopped_ = false;
 };
 
+// What a watch ends rays with.
+struct Stopped {};
+
+// Lets rays, which are taken in batches, be watched while it lives: as they are traced, or with
+// `gradients` as these are taken, which tracing again brings no further.
+class RayWatch {
+ public:
+  RayWatch(RayTracer& tracer,
+           RayBackward& sums,
+           bool gradients,
+           std::size_t rays,
+           const std::function<bool(double)>& within)
+      : tracer_(&tracer), sums_(&sums) {
+    if (!within) return;
+    const auto ask = [this, rays, &within](double share) {
+      const double done = static_cast<double>(first_) + share * static_cast<double>(count_);
+      if (!within(done / static_cast<double>(rays))) throw Stopped();
+    };
+    tracer.set_watch([ask, gradients](double share) { ask(gradients ? 0.0 : share); });
+    sums.set_watch(ask);
+  }
+  ~RayWatch() {
+    tracer_->set_watch({});
+    sums_->set_watch({});
+  }
+  RayWatch(const RayWatch&) = delete;
+  RayWatch& operator=(const RayWatch&) = delete;
+
+  void begin_batch(std::size_t first, std::size_t count) {
+    first_ = first;
+    count_ = count;
+  }
+
+ private:
+  RayTracer* tracer_;
+  RayBackward* sums_;
+  std::size_t first_ = 0, count_ = 0;
+};
+
 Gaussians downloaded(const GaussianGradients& gradients, int sh_degree) {
   Gaussians out;
   out.sh_degree = sh_degree;
@@ -155,7 +194,8 @@ struct Tracer::Impl {
   };
   void trace_batch(const DeviceGaussians& gaussians, std::size_t first, std::size_t count);
   RaysGradients backward(const DeviceGaussians& gaussians,
-                         std::span<const RayBackward::ResultGradient> gradients);
+                         std::span<const RayBackward::ResultGradient> gradients,
+                         const std::function<bool(double)>& within);
 
   Context& context;
   TraceOptions options;
@@ -299,10 +339,11 @@ void Tracer::Impl::trace_batch(const DeviceGaussians& gaussians,
 std::vector<RayResult> Tracer::trace(const Model& model,
                                      std::span<const Ray> rays,
                                      ColorDirection direction,
-                                     bool differentiable) {
+                                     bool differentiable,
+                                     const std::function<bool(double)>& within) {
   Impl& self = *impl_;
   const auto lock = self.context.lock();
-  self.require_idle();
+  const Impl::Rendering rendering(self);
   const DeviceGaussians& gaussians = gaussians_of(model, self.context);
   self.require_bare_rays();
   std::vector<Ray> sound;
@@ -316,10 +357,17 @@ std::vector<RayResult> Tracer::trace(const Model& model,
   std::vector<RayResult> out(self.rays.size());
   self.tracer.follow(gaussians);
   self.tracer.set_background(self.options.background);
-  for (std::size_t first = 0; first < out.size(); first += self.batch()) {
-    const std::size_t count = std::min(self.batch(), out.size() - first);
-    self.trace_batch(gaussians, first, count);
-    self.results.download(std::span<RayResult>(out).subspan(first, count));
+  RayWatch watch(self.tracer, self.sums, false, out.size(), within);
+  try {
+    for (std::size_t first = 0; first < out.size(); first += self.batch()) {
+      const std::size_t count = std::min(self.batch(), out.size() - first);
+      watch.begin_batch(first, count);
+      self.trace_batch(gaussians, first, count);
+      self.results.download(std::span<RayResult>(out).subspan(first, count));
+    }
+  } catch (const Stopped&) {
+    self.rays.clear();
+    return {};
   }
   for (const RayResult& result : out) self.capped += result.capped;
   if (differentiable) {
@@ -355,10 +403,12 @@ void trace(Tracer& tracer,
   copy_out(self.context, self.results.raw(), results, count * sizeof(RayResult), "the results");
 }
 
-RaysGradients Tracer::backward(const Model& model, std::span<const RayResultGradient> gradients) {
+RaysGradients Tracer::backward(const Model& model,
+                               std::span<const RayResultGradient> gradients,
+                               const std::function<bool(double)>& within) {
   Impl& self = *impl_;
   const auto lock = self.context.lock();
-  self.require_idle();
+  const Impl::Rendering rendering(self);
   const DeviceGaussians& gaussians = gaussians_of(model, self.context);
   if (self.revision == 0 || self.revision != gaussians.revision) {
     throw UsageError(
@@ -378,17 +428,24 @@ RaysGradients Tracer::backward(const Model& model, std::span<const RayResultGrad
     }
     numbers[i] = {g.color[0], g.color[1], g.color[2], g.alpha};
   }
-  return self.backward(gaussians, numbers);
+  try {
+    return self.backward(gaussians, numbers, within);
+  } catch (const Stopped&) {
+    return {};
+  }
 }
 
 RaysGradients Tracer::Impl::backward(const DeviceGaussians& gaussians,
-                                     std::span<const RayBackward::ResultGradient> of_rays) {
+                                     std::span<const RayBackward::ResultGradient> of_rays,
+                                     const std::function<bool(double)>& within) {
   RaysGradients out;
   out.rays.resize(rays.size());
   sums.begin(gaussians, {}, rays.size());
+  RayWatch watch(tracer, sums, true, rays.size(), within);
   std::vector<RayBackward::PaddedRayGradient> host_gradients;
   for (std::size_t first = 0; first < rays.size(); first += batch()) {
     const std::size_t count = std::min(batch(), rays.size() - first);
+    watch.begin_batch(first, count);
     if (count < rays.size()) trace_batch(gaussians, first, count);
     result_gradients.ensure(context, count, "ray gradients");
     result_gradients.upload(of_rays.subspan(first, count));

@@ -14,6 +14,7 @@
 #include "device/kernel.hpp"
 #include "light/mirror_paths.hpp"
 #include "raysplats/error.hpp"
+#include "scene/camera_check.hpp"
 #include "scene/pixel_count.hpp"
 #include "scene/planes.hpp"
 #include "scene/row_share.hpp"

@@ -176,6 +176,13 @@ class Work {
   const PrepareWatch& watch_;
 };
 
+std::vector<std::string> lines_of(const fs::path& file) {
+  std::ifstream stream(file);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
 /// Removes the images that are to be made anew, and before them the poses of what they showed;
 /// check_output() has let in nobody else's.
 void remove_former(const Work& work) {
@@ -187,11 +194,16 @@ std::vector<std::string> gather_images(const fs::path& input,
                                        const std::vector<std::string>& given,
                                        const PrepareOptions& options,
                                        Work& work) {
-  const bool video = !fs::is_directory(input);
+  const bool video = !is_folder(input);
   const fs::path images = work / "images";
-  const bool whole = video || std::all_of(given.begin(), given.end(), [&](const std::string& name) {
-                       return is_file(images / name);
-                     });
+  // The names of a video's frames, which are known once they are taken, and which data sets of
+  // older versions do not list.
+  const fs::path frames = work / "prepare/frames";
+  const auto taken = [&] { return is_file(frames) ? lines_of(frames) : photos_in(images); };
+  const std::vector<std::string> before = video && is_folder(images) ? taken() : given;
+  const bool whole = !before.empty() &&
+                     std::all_of(before.begin(), before.end(),
+                                 [&](const std::string& name) { return is_file(images / name); });
   if (!whole) work.forget("images");
   const std::string former = former_input(work.data(), input);
   std::string settings = (former.empty() ? place_of(input) : former) + "\n";
@@ -207,6 +219,7 @@ std::vector<std::string> gather_images(const fs::path& input,
       remove_former(work);
       take_frames(input, facts, images, options.frames, work.log(),
                   [&](std::size_t done, std::size_t of) { return work.watch("frames", done, of); });
+      write_text_file(frames, fmt::format("{}\n", fmt::join(photos_in(images), "\n")));
       return;
     }
     remove_former(work);
@@ -216,7 +229,9 @@ std::vector<std::string> gather_images(const fs::path& input,
                     "Interrupted among the photos: the same command copies them anew");
     });
   });
-  return video ? photos_in(images) : given;
+  if (video && !is_file(frames))
+    write_text_file(frames, fmt::format("{}\n", fmt::join(photos_in(images), "\n")));
+  return video ? lines_of(frames) : given;
 }
 
 std::string model_settings(const ColmapPlan& plan) {
@@ -405,10 +420,10 @@ Prepared prepare_data(const fs::path& input,
                       const fs::path& data,
                       const PrepareOptions& options,
                       const PrepareWatch& watch) {
-  if (!fs::exists(input))
+  if (!is_there(input))
     throw DataError(
         fmt::format("{} does not exist: name a folder of photos or a video", input.string()));
-  const bool video = !fs::is_directory(input);
+  const bool video = !is_folder(input);
   if (video && is_photo(input))
     throw DataError(fmt::format("{} is a photo: name its folder", input.string()));
   find_program("colmap", "colmap");

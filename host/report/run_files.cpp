@@ -12,6 +12,7 @@
 
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"
+#include "util/file_kind.hpp"
 #include "util/number_text.hpp"
 
 namespace raysplats::report {
@@ -28,7 +29,7 @@ nlohmann::json metrics_of(const fs::path& run) {
   std::error_code error;
   if (!fs::is_regular_file(run / "metrics.json", error)) {
     throw DataError(
-        fs::exists(run, error)
+        is_there(run)
             ? fmt::format("{} is no training run: it holds no metrics.json", run.string())
             : fmt::format("{} does not exist: name the folder of a training run", run.string()));
   }
@@ -107,6 +108,7 @@ std::map<std::string, std::vector<double>> columns_of(const fs::path& path) {
   std::getline(stream, line);
   const std::vector<std::string> names = cells(line);
   std::map<std::string, std::vector<double>> out;
+  for (const std::string& name : names) out[name];
   while (std::getline(stream, line)) {
     const std::vector<std::string> values = cells(line);
     std::vector<double> numbers;

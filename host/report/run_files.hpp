@@ -45,7 +45,8 @@ constexpr std::array<Origin, 6> kOrigins{{{"Device", "device"},
                                           {"Fingerprint of the data set", "data"},
                                           {"Hash of the model (XXH3, 128 bits)", "model_hash"}}};
 
-/// Columns of metrics.csv by name; rows that are incomplete or no numbers are left out.
+/// Columns of metrics.csv by name, empty ones too; rows that are incomplete or no numbers are left
+/// out.
 std::map<std::string, std::vector<double>> columns_of(const std::filesystem::path& path);
 /// One column over another.
 Curve curve(const std::string& name,

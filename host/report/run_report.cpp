@@ -15,6 +15,7 @@
 
 #include "io/image_file.hpp"
 #include "io/json_file.hpp"
+#include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "report/camera_map.hpp"
 #include "report/chart.hpp"
@@ -80,6 +81,16 @@ std::string held_out(const fs::path& run,
 /// A heading and what stands below it; nothing without that.
 std::string section(const char* heading, const std::string& content) {
   return content.empty() ? "" : fmt::format("<h2>{}</h2>\n{}", heading, content);
+}
+
+/// What `make` makes of files of the run, or why it cannot, where they are damaged.
+template <class Make>
+std::string made_or_why(Make make) {
+  try {
+    return make();
+  } catch (const DataError& error) {
+    return fmt::format("<p class=\"warn\">{}</p>\n", escaped(error.what()));
+  }
 }
 
 std::string in_grid(const std::string& charts) {
@@ -182,7 +193,10 @@ std::string origin(const Json& metrics) {
 }
 
 std::string configuration(const fs::path& run) {
-  const std::string text = text_of(run / "config.toml");
+  const fs::path file = run / "config.toml";
+  std::error_code error;
+  if (!fs::is_regular_file(file, error)) return "<p>There is no config.toml that tells them.</p>\n";
+  const std::string text = text_of(file);
   const std::map<std::string, std::string> defaults = settings(to_toml({}));
   std::string changed;
   for (const auto& [key, value] : settings(text)) {
@@ -235,8 +249,11 @@ Page page_of(const fs::path& run) {
       run_name(run),
       said + "<table>\n" + facts + "</table>\n" + section("Curves", charts(columns, evaluations)) +
           section("Held-out views", held_out(run, evaluations, views)) +
-          section("Cameras", in_grid(camera_map(run, views, objects(metrics, "photos")))) +
-          section("Model", model_histograms(run)) + section("Exposure", exposures(run)) +
+          section("Cameras", made_or_why([&] {
+                    return in_grid(camera_map(run, views, objects(metrics, "photos")));
+                  })) +
+          section("Model", made_or_why([&] { return model_histograms(run); })) +
+          section("Exposure", made_or_why([&] { return exposures(run); })) +
           section("Kernels", kernels(metrics)) +
           section("Settings that differ from the defaults", configuration(run)));
   return {std::move(text), std::move(warnings)};

@@ -9,8 +9,9 @@ namespace raysplats {
 
 /// A page about a training run from the files of its folder: verdict and warnings, curves, held-out
 /// views (photo, render, error: the worst, a typical and the best), settings that differ from the
-/// defaults. One file without script or anything from elsewhere; well-formed XML. Throws DataError
-/// for a folder that is no run or whose files, other than pictures, are damaged.
+/// defaults. One file without script or anything from elsewhere; well-formed XML. Damaged pictures,
+/// cameras, exposures and models are told in their place. Throws DataError for a folder that is no
+/// run or whose other files are damaged.
 std::string run_report(const std::filesystem::path& run);
 
 /// The files of a run that its page is made from, those that are not there among them, with all

@@ -154,6 +154,8 @@ std::string blurred(const std::vector<Json>& photos) {
 /// distances count so many `times`.
 std::string odd(const std::vector<Json>& photos, double times) {
   constexpr std::size_t kNeighbours = 2;
+  constexpr std::size_t kLeast = 12;  // of fewer photos each shows much that no other does
+  if (photos.size() < kLeast) return "";
   std::vector<Json> found = far_below(photos, "psnr", itself, kOddDecibels, times);
   std::erase_if(found, [&](const Json& photo) {
     std::vector<std::pair<double, double>> others;  // squared distance, PSNR
@@ -184,8 +186,9 @@ void warn_of_views(const std::vector<Json>& views,
   const auto warn = [&](const char* what, const std::string& names) {
     if (!names.empty()) out.push_back(what + names);
   };
-  warn("Views far worse than the others, whose pose or photo may be wrong: ",
-       names_of(far_below(views, "psnr", itself, kOddDecibels)));
+  warn(
+      "Views far worse than the others; pose or photo may be wrong, or few photos show that part: ",
+      names_of(far_below(views, "psnr", itself, kOddDecibels)));
   warn("Held-out photos less sharp than the others: ", blurred(views));
   warn("Training photos less sharp than the others, which blur the model: ", blurred(photos));
   warn(

@@ -19,6 +19,8 @@
 #include "raysplats/io.hpp"
 #include "run/train_config.hpp"
 #include "scene/gaussian_transform.hpp"
+#include "util/file_kind.hpp"
+#include "util/shell_word.hpp"
 
 namespace raysplats {
 namespace {
@@ -107,7 +109,7 @@ std::string meant(const std::filesystem::path& folder) {
   for (const char* cameras : {"transforms.json", "transforms_train.json", "sparse"}) {
     if (std::filesystem::exists(folder / cameras, error))
       return fmt::format("it is a data set: 'raysplats train {} -o RUN' makes a model of it",
-                         folder.string());
+                         shell_word(folder.string()));
   }
   const std::vector<std::string> names = models_in(folder);
   if (names.empty()) return "name a run that has saved a model, or a file";
@@ -145,7 +147,7 @@ std::vector<std::string> models_in(const std::filesystem::path& folder) {
 ModelSource find_model(const std::filesystem::path& path) {
   std::error_code error;
   ModelSource source;
-  if (!std::filesystem::exists(path, error)) {
+  if (!is_there(path)) {
     throw DataError(fmt::format("The model {} does not exist: check the path", path.string()));
   }
   if (!std::filesystem::is_directory(path, error)) {

@@ -23,6 +23,7 @@
 #include "raysplats/io.hpp"
 #include "run/train_config.hpp"
 #include "util/atomic_file.hpp"
+#include "util/number_text.hpp"
 #include "util/output_directory.hpp"
 
 namespace raysplats {
@@ -94,7 +95,10 @@ FileLock RunFolder::lock() const {
   make_output_directory(path_);
   FileLock lock(path_ / ".lock");
   const std::size_t stale = remove_stale_temporaries(path_);
-  if (stale > 0) spdlog::info("{} temporary files of a run that was killed are removed", stale);
+  if (stale > 0) {
+    spdlog::info("Removed {} that a killed process has left",
+                 counted(static_cast<double>(stale), "temporary file"));
+  }
   return lock;
 }
 

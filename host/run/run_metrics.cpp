@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <memory>
@@ -40,11 +40,12 @@ std::string with_all_columns(const std::string& row, const std::string& header) 
 // Iteration, seconds, loss and PSNR of a row of metrics.csv; what it lacks is 0.
 TrainRow first_columns(const std::string& line) {
   TrainRow row;
-  char* next = nullptr;
-  row.iteration = std::strtoll(line.c_str(), &next, 10);
+  const char* end = line.data() + line.size();
+  const char* next = std::from_chars(line.data(), end, row.iteration).ptr;
   for (double* column : {&row.seconds, &row.loss, &row.psnr}) {
-    if (*next != ',') break;
-    const double value = std::strtod(next + 1, &next);
+    if (next == end || *next != ',') break;
+    double value = 0;
+    next = std::from_chars(next + 1, end, value).ptr;
     if (std::isfinite(value)) *column = value;
   }
   return row;

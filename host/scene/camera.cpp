@@ -56,11 +56,11 @@ Camera look_at(const glm::dvec3& eye,
   const glm::dvec3 view = target - eye;
   const double upwards = glm::length(up);
   // Also where a square leaves double precision.
-  if (!std::isnormal(glm::dot(view, view)) || !std::isfinite(upwards)) {
+  if (!std::isnormal(glm::dot(view, view)) || !std::isfinite(upwards) || !std::isfinite(focal)) {
     throw UsageError(fmt::format(
-        "A camera at ({}, {}, {}) cannot look at ({}, {}, {}) with ({}, {}, {}) upwards: give "
-        "finite numbers and a target apart from the camera",
-        eye.x, eye.y, eye.z, target.x, target.y, target.z, up.x, up.y, up.z));
+        "A camera at ({}, {}, {}) cannot look at ({}, {}, {}) with ({}, {}, {}) upwards and a "
+        "focal length of {}: give finite numbers and a target apart from the camera",
+        eye.x, eye.y, eye.z, target.x, target.y, target.z, up.x, up.y, up.z, focal));
   }
   const glm::dvec3 forward = glm::normalize(view);
   glm::dvec3 right = glm::cross(forward, up);

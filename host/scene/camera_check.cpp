@@ -49,6 +49,36 @@ bool is_rotation(const glm::dmat3& matrix, double tolerance) {
   return glm::determinant(matrix) > 0.0;
 }
 
+void require_pixels(const Camera& camera) {
+  if (camera.model == CameraModel::kPhotoLens) {
+    throw UsageError(fmt::format(
+        "Camera '{}' has a lens that only photos have: give the camera of the view, not that of "
+        "its photo",
+        camera.name));
+  }
+  const bool focal = camera.model != CameraModel::kEquirectangular;
+  if (camera.width < 1 || camera.height < 1 || (focal && (!(camera.fx > 0) || !(camera.fy > 0)))) {
+    throw UsageError(fmt::format("Camera '{}' has no pixels or no focal length", camera.name));
+  }
+  const Distortion& d = camera.distortion;
+  double sum = camera.cx + camera.cy + camera.fx + camera.fy;
+  sum += d.k1 + d.k2 + d.k3 + d.k4 + d.p1 + d.p2;
+  for (int k = 0; k < 3; ++k) {
+    sum += camera.translation[k];
+    for (int row = 0; row < 3; ++row) sum += camera.rotation[k][row];
+  }
+  if (!std::isfinite(sum)) {
+    throw UsageError(fmt::format(
+        "Camera '{}' has a pose or a lens that is not finite: correct its numbers", camera.name));
+  }
+  if (!is_rotation(camera.rotation)) {
+    throw UsageError(fmt::format(
+        "Camera '{}' has a rotation that scales, shears or mirrors: give rows of length 1 at right "
+        "angles, with a determinant of 1",
+        camera.name));
+  }
+}
+
 void require_believable(const Camera& camera, const std::string& what) {
   const glm::dvec3 center = camera.center();
   // Written so that NaN is too far.

@@ -25,6 +25,10 @@ constexpr double kRotationTolerance = 1e-3;
 /// and do not mirror.
 bool is_rotation(const glm::dmat3& matrix, double tolerance = kRotationTolerance);
 
+/// Throws UsageError for a camera without pixels or focal length, with a number that is not finite,
+/// with a rotation that is none, or of CameraModel::kPhotoLens.
+void require_pixels(const Camera& camera);
+
 /// Throws DataError, which names `what` ("the camera of a.png"), for a camera that no photo can
 /// have been taken with: one that is more than 1e9 from the origin or whose lens moves the corner
 /// of the picture to a thousand times its distance from the centre.

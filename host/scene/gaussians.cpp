@@ -18,6 +18,7 @@ void Gaussians::resize(std::size_t count) {
 }
 
 Gaussians with_sh_degree(const Gaussians& model, int degree) {
+  check_sizes(model);
   check_sh_degree(degree);
   Gaussians out = model;
   const auto from = 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree));

@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <tuple>
 #include <unordered_map>
@@ -43,15 +44,16 @@ std::vector<std::uint32_t> position_numbers(const Mesh& mesh) {
   return result;
 }
 
-/// Vertices that stand for those within `near` of them along every axis.
+/// Vertices that stand for those within `near`, which is positive, of them along every axis.
 class NearVertices {
  public:
-  NearVertices(std::span<const float> positions, double near) : positions_(positions), near_(near) {
+  NearVertices(std::span<const float> positions, const std::array<double, 3>& near)
+      : positions_(positions), near_(near) {
     firsts_.reserve(positions.size() / 3);
   }
   /// The one that stands for vertex i; i itself, from now on, where there is none.
   std::size_t first(std::size_t i) {
-    const Cell from = cell(i, -near_), to = cell(i, near_);
+    const Cell from = cell(i, -1.0), to = cell(i, 1.0);
     Cell at;
     for (at[0] = from[0]; at[0] <= to[0]; ++at[0]) {
       for (at[1] = from[1]; at[1] <= to[1]; ++at[1]) {
@@ -72,36 +74,47 @@ class NearVertices {
   static constexpr double kWidth = 64;       // times `near`
   static constexpr double kFarthest = 1e18;  // cells, which an integer holds
 
+  // Of the place that is `moved` times `near` away.
   Cell cell(std::size_t i, double moved) const {
     Cell out;
     for (std::size_t c = 0; c < 3; ++c) {
-      const double position = static_cast<double>(positions_[3 * i + c]) + moved;
+      const double position = static_cast<double>(positions_[3 * i + c]) + moved * near_[c];
       out[c] = static_cast<std::int64_t>(
-          std::clamp(std::floor(position / (kWidth * near_)), -kFarthest, kFarthest));
+          std::clamp(std::floor(position / (kWidth * near_[c])), -kFarthest, kFarthest));
     }
     return out;
   }
   bool is_near(std::size_t i, std::size_t other) const {
     for (std::size_t c = 0; c < 3; ++c) {
       const double apart = static_cast<double>(positions_[3 * i + c]) - positions_[3 * other + c];
-      if (std::abs(apart) > near_) return false;
+      if (std::abs(apart) > near_[c]) return false;
     }
     return true;
   }
 
   std::span<const float> positions_;
-  double near_;
+  std::array<double, 3> near_;
   std::unordered_multimap<Cell, std::size_t, WordsHash> firsts_;
 };
 
 // The mesh with one vertex for those whose positions differ by rounding alone, as at the seam of a
-// sphere: by less than a millionth of its size along every axis.
+// sphere: along every axis by less than a millionth of its longest side, or by the last digit of a
+// float that is as large as its coordinates there.
 Mesh joined(Mesh mesh) {
-  constexpr double kRounding = 1e-6;
-  if (mesh.positions.empty()) return mesh;
-  const auto [low, high] = std::minmax_element(mesh.positions.begin(), mesh.positions.end());
-  const double near = kRounding * (static_cast<double>(*high) - *low);
-  if (!(near > 0)) return mesh;
+  constexpr double kRounding = 1e-6, kLastDigit = 0x1p-23;
+  std::array<double, 3> near{};
+  double side = 0.0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const std::uint32_t vertex : mesh.triangles) {
+      low = std::min(low, static_cast<double>(mesh.positions[3 * std::size_t{vertex} + c]));
+      high = std::max(high, static_cast<double>(mesh.positions[3 * std::size_t{vertex} + c]));
+    }
+    side = std::max(side, high - low);
+    near[c] = kLastDigit * std::max(std::abs(low), std::abs(high));
+  }
+  if (!(side > 0)) return mesh;
+  for (double& each : near) each = std::max(each, kRounding * side);
   NearVertices vertices(mesh.positions, near);
   std::vector<std::uint32_t> firsts(mesh.vertex_count());
   for (std::size_t i = 0; i < firsts.size(); ++i)

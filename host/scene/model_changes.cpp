@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -26,11 +27,14 @@ constexpr double kLeastScale = 1e-30, kMostScale = 1e30;  // beyond, 32-bit posi
 
 /// The shortest turn of `up` to -y.
 glm::dmat4 uprighting(const glm::dvec3& up) {
-  const double length = glm::length(up);
-  if (!(length > 0.0) || !std::isfinite(length))
-    throw UsageError("up 0,0,0 is no direction: say which one is to be up");
+  // Divided first, as squares of small and large numbers leave those that a double holds.
+  const double largest = std::max({std::abs(up.x), std::abs(up.y), std::abs(up.z)});
+  const glm::dvec3 from = glm::normalize(up / largest);
+  if (!std::isfinite(from.x + from.y + from.z)) {
+    throw UsageError(
+        fmt::format("up {},{},{} is no direction: say which one is to be up", up.x, up.y, up.z));
+  }
   const glm::dvec3 goal(0.0, -1.0, 0.0);
-  const glm::dvec3 from = up / length;
   const glm::dvec3 axis = glm::cross(from, goal);
   const double sine = glm::length(axis);
   const double cosine = glm::dot(from, goal);

@@ -97,7 +97,7 @@ std::vector<Camera> ellipse_cameras(std::span<const Camera> photos, int frames) 
 
 std::vector<Camera> spiral_cameras(std::span<const Camera> photos, int frames) {
   require(photos, frames, "--spiral");
-  const glm::dvec3 up = estimate_up(photos);
+  glm::dvec3 up = estimate_up(photos);
   glm::dvec3 middle(0.0);
   glm::dvec3 forward(0.0);
   for (const Camera& photo : photos) {
@@ -111,6 +111,11 @@ std::vector<Camera> spiral_cameras(std::span<const Camera> photos, int frames) {
         "or --interpolate");
   }
   forward = glm::normalize(forward);
+  // Photos straight down whose ups cancel have none: then that of the first is kept.
+  if (glm::length(glm::cross(up, forward)) < 1e-6) {
+    const glm::dmat3 first = glm::transpose(photos.front().rotation);
+    up = std::abs(glm::dot(first[1], forward)) < 0.9 ? -first[1] : first[0];
+  }
   const glm::dvec3 right = glm::normalize(glm::cross(-up, forward));
   const glm::dvec3 down = glm::cross(forward, right);
   const auto width = [&](const glm::dvec3& axis) {

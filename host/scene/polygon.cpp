@@ -56,6 +56,8 @@ class Ears {
   }
 
   std::size_t size() const { return size_; }
+  /// Corners that were looked at so far.
+  std::size_t work() const { return work_; }
   std::size_t next(std::size_t corner) const { return next_[corner]; }
 
   /// A corner and its neighbours.
@@ -64,11 +66,12 @@ class Ears {
   }
 
   /// Whether the triangle at a corner is convex and holds no other corner that is left.
-  bool is_ear(std::size_t corner) const {
+  bool is_ear(std::size_t corner) {
     const auto [a, b, c] = triangle(corner);
     if (turn(points_[a], points_[b], points_[c]) <= 0.0) return false;
     // Only a reflex corner can lie in it; repeated points (bridges to holes) do not count.
     for (const std::size_t i : reflex_) {
+      ++work_;
       const glm::dvec2& p = points_[i];
       if (turn(points_[a], points_[b], p) >= 0.0 && turn(points_[b], points_[c], p) >= 0.0 &&
           turn(points_[c], points_[a], p) >= 0.0 && p != points_[a] && p != points_[b] &&
@@ -120,6 +123,7 @@ class Ears {
 
   std::optional<std::size_t> known_ear(std::size_t corner) {
     for (std::size_t i = 0, at = corner; i < size_; ++i, at = next_[at]) {
+      ++work_;
       if (kind_[at] == Kind::kUnknown) {
         kind_[at] = is_ear(at) ? Kind::kEar : Kind::kNoEar;
         tests_left_ -= tests_left_ > 0 ? 1 : 0;
@@ -136,12 +140,11 @@ class Ears {
   std::vector<std::size_t> reflex_;  ///< corners that are left and not convex
   std::size_t size_;
   std::size_t tests_left_;
+  std::size_t work_ = 0;
 };
 
 /// The ear of a quadrilateral whose cut is the shortest, the first of its corners without ears.
-std::size_t best_of_four(const Ears& ears,
-                         std::span<const glm::dvec3> corners,
-                         std::size_t one_of_them) {
+std::size_t best_of_four(Ears& ears, std::span<const glm::dvec3> corners, std::size_t one_of_them) {
   std::array<std::size_t, 4> left{one_of_them};
   for (std::size_t i = 1; i < 4; ++i) left[i] = ears.next(left[i - 1]);
   // In the order of the polygon, so that of equal cuts always the same is taken.
@@ -162,7 +165,8 @@ std::size_t best_of_four(const Ears& ears,
 
 }  // namespace
 
-std::vector<std::array<std::size_t, 3>> triangulate(std::span<const glm::dvec3> corners) {
+std::vector<std::array<std::size_t, 3>> triangulate(std::span<const glm::dvec3> corners,
+                                                    std::size_t* work) {
   std::vector<std::array<std::size_t, 3>> triangles;
   if (corners.size() < 3) return triangles;
   triangles.reserve(corners.size() - 2);
@@ -179,6 +183,7 @@ std::vector<std::array<std::size_t, 3>> triangulate(std::span<const glm::dvec3> 
     // The next corner's neighbour is gone: going on behind it keeps the triangles from being a fan.
     at = ears.next(ears.next(at));
   }
+  if (work != nullptr) *work += ears.work();
   std::array<std::size_t, 3> last = ears.triangle(at);
   std::rotate(last.begin(), std::min_element(last.begin(), last.end()), last.end());
   triangles.push_back(last);

@@ -11,6 +11,7 @@
 
 #include "util/parallel.hpp"
 #include "util/rng.hpp"
+#include "util/stop_if_interrupted.hpp"
 
 namespace raysplats {
 namespace {
@@ -140,6 +141,7 @@ class Clusters {
 
   /// The nearest middle of each of `members`.
   void label(std::span<const std::uint32_t> members, std::span<std::uint32_t> labels) const {
+    stop_if_interrupted();
     std::vector<float> norms(count_, 0.0f);
     for (std::size_t d = 0; d < width_; ++d) {
       for (std::size_t k = 0; k < count_; ++k)

@@ -3,10 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "raysplats/error.hpp"
-#include "scene/camera_check.hpp"
 #include "scene/camera_model.hpp"
 #include "scene/pixel_count.hpp"
 #include "shared/layout.h"
@@ -70,36 +67,6 @@ RsLensCamera lens_camera(const Camera& camera, const Lens& lens) {
   out.seed_lo = static_cast<std::uint32_t>(lens.seed);
   out.seed_hi = static_cast<std::uint32_t>(lens.seed >> 32);
   return out;
-}
-
-void require_pixels(const Camera& camera) {
-  if (camera.model == CameraModel::kPhotoLens) {
-    throw UsageError(fmt::format(
-        "Camera '{}' has a lens that only photos have: give the camera of the view, not that of "
-        "its photo",
-        camera.name));
-  }
-  const bool focal = camera.model != CameraModel::kEquirectangular;
-  if (camera.width < 1 || camera.height < 1 || (focal && (!(camera.fx > 0) || !(camera.fy > 0)))) {
-    throw UsageError(fmt::format("Camera '{}' has no pixels or no focal length", camera.name));
-  }
-  const Distortion& d = camera.distortion;
-  double sum = camera.cx + camera.cy + camera.fx + camera.fy;
-  sum += d.k1 + d.k2 + d.k3 + d.k4 + d.p1 + d.p2;
-  for (int k = 0; k < 3; ++k) {
-    sum += camera.translation[k];
-    for (int row = 0; row < 3; ++row) sum += camera.rotation[k][row];
-  }
-  if (!std::isfinite(sum)) {
-    throw UsageError(fmt::format(
-        "Camera '{}' has a pose or a lens that is not finite: correct its numbers", camera.name));
-  }
-  if (!is_rotation(camera.rotation)) {
-    throw UsageError(fmt::format(
-        "Camera '{}' has a rotation that scales, shears or mirrors: give rows of length 1 at right "
-        "angles, with a determinant of 1",
-        camera.name));
-  }
 }
 
 void require_room(const Camera& camera, const DeviceInfo& device) {

@@ -27,10 +27,6 @@ struct Lens {
 int camera_model_number(CameraModel model);
 RsLensCamera lens_camera(const Camera& camera, const Lens& lens);
 
-/// Throws UsageError for a camera without pixels or focal length, with a number that is not finite,
-/// or with a rotation that is none.
-void require_pixels(const Camera& camera);
-
 /// Throws ResourceError for a camera whose picture, four floats a pixel, fits in no buffer of the
 /// device.
 void require_room(const Camera& camera, const DeviceInfo& device);

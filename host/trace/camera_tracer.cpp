@@ -8,6 +8,7 @@
 
 #include "bvh/gaussian_bounds.hpp"
 #include "raysplats/error.hpp"
+#include "scene/camera_check.hpp"
 #include "scene/planes.hpp"
 #include "scene/trace_option_table.hpp"
 #include "trace/camera_rays.hpp"
@@ -15,9 +16,6 @@
 
 namespace raysplats {
 namespace {
-
-// Longest launch while somebody watches the picture.
-constexpr double kWatchedMilliseconds = 300.0;
 
 const std::vector<int> kFront{0};
 
@@ -41,7 +39,7 @@ CameraTracer::Impl::Impl(Context& context_in, const TraceOptions& options_in)
       forward_budget(options_in.launch_budget_ms, context_in.device().type),
       backward_budgets{LaunchBudget(options_in.launch_budget_ms, context_in.device().type),
                        LaunchBudget(options_in.launch_budget_ms, context_in.device().type)},
-      watched_budget(kWatchedMilliseconds, context_in.device().type),
+      watched_budget(LaunchBudget::kWatched, context_in.device().type),
       streams(context_in, packet().lanes, shares.hit_streams()),
       counters(context_in, RS_COUNT_WORDS, "trace counters"),
       overflow(context_in, 1, "overflow of a view"),

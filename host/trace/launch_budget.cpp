@@ -29,11 +29,11 @@ std::uint32_t LaunchBudget::rows(std::uint32_t left) {
 // A launch that took too long says that those to come must be smaller, and only one as large as
 // they are that they may grow: of several that ran before the first was looked at, one does.
 void LaunchBudget::record(std::uint32_t rows, double seconds) {
-  const double fit = seconds > 0 ? rows * seconds_ / seconds : kMostRows;
+  const double fit = seconds > 0 ? rows * limit() / seconds : kMostRows;
   const double most = std::min(kMostGrowth * rows, kMostRows);
   settled_ = settled_ || fit <= most;
   const auto size = static_cast<std::uint32_t>(std::clamp(fit, 1.0, most));
-  if (seconds > seconds_) {
+  if (seconds > limit()) {
     rows_ = std::min(rows_, size);
   } else if (rows >= rows_) {
     rows_ = size;

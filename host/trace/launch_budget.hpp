@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <utility>
 
 #include "device/context.hpp"
@@ -22,8 +23,15 @@ class LaunchBudget {
   LaunchBudget(double milliseconds, DeviceType device);
 
   static constexpr double kDefault = 100.0;
+  /// While somebody watches, where no other time bounds them.
+  static constexpr double kWatched = 300.0;
 
-  bool bounded() const { return seconds_ > 0; }
+  /// Lets `watch` hear, from the next in_bands() on, the share of its rows that is done after every
+  /// launch, when that is over; what it throws ends the work. Nothing is heard with {}.
+  void set_watch(std::function<void(double share)> watch) { watch_ = std::move(watch); }
+  const std::function<void(double share)>& watch() const { return watch_; }
+
+  bool bounded() const { return limit() > 0; }
   /// Rows of the next launch when `left` are to be done; at least 1.
   std::uint32_t rows(std::uint32_t left);
   /// A launch of `rows` rows took `seconds`.
@@ -37,7 +45,10 @@ class LaunchBudget {
     LaunchTimer timer;
   };
 
+  double limit() const { return watch_ && seconds_ == 0 ? 1e-3 * kWatched : seconds_; }
+
   double seconds_;
+  std::function<void(double)> watch_;
   std::uint32_t rows_ = 4;
   bool settled_ = false;         // rows_ fits what a launch took, or all rows fit one
   std::deque<Launch> launches_;  // whose time is not known yet
@@ -58,6 +69,9 @@ void in_bands(Context& context, LaunchBudget& budget, std::uint32_t rows, const 
       launch(row, now);
     }
     row += now;
+    if (!budget.watch()) continue;
+    context.finish();
+    budget.watch()(static_cast<double>(row) / rows);
   }
 }
 

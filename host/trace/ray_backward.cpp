@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <glm/vec3.hpp>
 #include <numbers>
+#include <utility>
 
 #include "device/kernel.hpp"
 #include "raysplats/error.hpp"
@@ -155,6 +156,10 @@ void RayBackward::add(const DeviceGaussians& gaussians,
                   results, gradients, records_, shares_, sums_.target(),
                   ray_gradients != nullptr ? *ray_gradients : no_ray_gradients_);
   });
+}
+
+void RayBackward::set_watch(std::function<void(double)> watch) {
+  budget_.set_watch(std::move(watch));
 }
 
 void RayBackward::finish(const DeviceGaussians& gaussians, GaussianGradients& gradients) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
@@ -70,6 +71,9 @@ class RayBackward {
            const Buffer<ResultGradient>& gradients,
            ColorDirection color_direction,
            Buffer<PaddedRayGradient>* ray_gradients = nullptr);
+  /// As RayTracer::set_watch(), of add(), which then waits; begin() has to follow one that ended
+  /// so.
+  void set_watch(std::function<void(double share)> watch);
   /// Overwrites `gradients`, growing its buffers as needed.
   void finish(const DeviceGaussians& gaussians, GaussianGradients& gradients);
 

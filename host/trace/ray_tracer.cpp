@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "device/kernel.hpp"
 #include "raysplats/error.hpp"
@@ -144,6 +145,10 @@ void RayTracer::set_background(const std::array<float, 3>& background) {
 }
 
 void RayTracer::set_near(const RayNear& near) { impl_->near = near; }
+
+void RayTracer::set_watch(std::function<void(double)> watch) {
+  impl_->budget.set_watch(std::move(watch));
+}
 
 const RayNear& RayTracer::near() const { return impl_->near; }
 

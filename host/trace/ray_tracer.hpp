@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -58,6 +59,9 @@ class RayTracer {
   /// What rays do not meet from the next trace() on; RayBackward follows.
   void set_near(const RayNear& near);
   const RayNear& near() const;
+  /// Lets `watch` hear, from the next trace() on, the share of its rays that is done after every
+  /// launch, which then are short ones; what it throws ends trace(). Nothing is heard with {}.
+  void set_watch(std::function<void(double share)> watch);
   const TraceOptions& options() const;
   /// Throws UsageError unless the tree is that of these Gaussians as they are now.
   void require_current(const DeviceGaussians& gaussians) const;

@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "io/data_option_table.hpp"
 #include "io/dataset_views.hpp"
 #include "io/photo.hpp"
 #include "raysplats/error.hpp"
@@ -52,8 +53,29 @@ struct PictureBudget {
   }
 };
 
-TrainOptions with_length(TrainOptions options, const Dataset& dataset) {
+// How the data set was read, which options may leave to it. Throws UsageError where they say
+// something else: the run would be evaluated on other pictures than it was trained on.
+DatasetOptions data_options(DatasetOptions said, const Dataset& dataset) {
+  if (!dataset.read_as) return said;
+  DatasetOptions read = *dataset.read_as, usual;
+  read.origin = dataset.origin;
+  const std::vector<OptionRow> of_said = data_option_rows(said);
+  const std::vector<OptionRow> of_read = data_option_rows(read);
+  const std::vector<OptionRow> of_usual = data_option_rows(usual);
+  for (std::size_t i = 0; i < of_said.size(); ++i) {
+    const std::string text = of_said[i].text();
+    if (text == of_usual[i].text() || text == of_read[i].text()) continue;
+    throw UsageError(fmt::format(
+        "The options of the run say '{}' = {}, and its data set was read with {}: read it with the "
+        "same, or leave that option out",
+        of_said[i].name, text, of_read[i].text()));
+  }
+  return read;
+}
+
+TrainOptions complete_options(TrainOptions options, const Dataset& dataset) {
   check_train_options(options);
+  options.data = data_options(options.data, dataset);
   options.iterations = run_length(options, dataset.indices(Split::kTrain).size());
   validate(options);
   return options;
@@ -70,7 +92,8 @@ Trainer::Impl::Impl(Context& device,
     : context(device),
       ranks(others != nullptr ? *others : alone),
       dataset(without_ignored_photos(std::move(data))),
-      options(with_length(train_options, dataset)),
+      said_data(train_options.data),
+      options(complete_options(train_options, dataset)),
       run(std::move(run_path), ranks.leads()),
       overwrite(replace),
       train_views(dataset.indices(Split::kTrain)),
@@ -173,13 +196,16 @@ Trainer::Trainer(Context& context,
                  const TrainOptions& options,
                  std::filesystem::path run_folder,
                  bool overwrite,
-                 Communicator* ranks)
-    : impl_(std::make_unique<Impl>(
-          context, std::move(dataset), options, std::move(run_folder), overwrite, ranks)) {}
+                 Communicator* ranks) {
+  const auto turn = context.lock();
+  impl_ = std::make_unique<Impl>(context, std::move(dataset), options, std::move(run_folder),
+                                 overwrite, ranks);
+}
 Trainer::~Trainer() = default;
 
 void Trainer::resume(const std::filesystem::path& source) {
   const auto turn = impl_->context.lock();
+  if (impl_->busy) Impl::refuse_while_busy();
   impl_->resume(source);
 }
 

@@ -244,6 +244,7 @@ struct Trainer::Impl {
   Communicator alone;
   Communicator& ranks;
   Dataset dataset;
+  DatasetOptions said_data;  // by the options, before the data set told how it was read
   TrainOptions options;
   RunFolder run;
   bool overwrite;
@@ -320,8 +321,8 @@ struct Trainer::Impl {
 
   [[noreturn]] static void refuse_while_busy() {
     throw UsageError(
-        "The trainer is training already: wait for its run() or step(), and call neither from its "
-        "callback");
+        "The trainer is training already: call run(), step(), resume() and on_step() when that is "
+        "over, not from its callback");
   }
   // Marks the trainer as busy while it lives.
   struct Busy {

@@ -10,6 +10,7 @@
 #include "train/trainer_impl.hpp"
 #include "util/file_kind.hpp"
 #include "util/interrupt.hpp"
+#include "util/shell_word.hpp"
 
 namespace raysplats {
 namespace {
@@ -87,6 +88,7 @@ void Trainer::Impl::run_iterations(std::int64_t until, const Loop& loop) {
     const auto turn = context.lock();
     stop = finish_iteration(loop, run_iteration(loop), true);
   }
+  const auto turn = context.lock();
   finish_steps();
 }
 
@@ -184,26 +186,33 @@ void Trainer::Impl::run_and_rescue(std::int64_t until,
                                    const std::function<bool()>& interrupted) {
   Progress progress("Training", last_iteration(options), iteration,
                     show_progress ? stderr : nullptr);
-  clock.row_iteration = iteration;
-  clock.row_seconds = clock.training.seconds();
-  clock.training.start();
+  {
+    const auto turn = context.lock();
+    clock.row_iteration = iteration;
+    clock.row_seconds = clock.training.seconds();
+    clock.training.start();
+  }
+  const auto stop_clock = [this] {
+    const auto turn = context.lock();
+    clock.training.stop();
+  };
   try {
     run_iterations(until, {scheduled, progress, interrupted});
   } catch (const Error& error) {
-    clock.training.stop();
+    stop_clock();
     if (error.code() == ErrorCode::kRuntime) throw;  // the model itself is at fault
     throw_with(error, rescue());
   } catch (const std::bad_alloc&) {
-    clock.training.stop();
+    stop_clock();
     throw_with(ResourceError("The host has no memory left: use smaller images (--downscale) or a "
                              "smaller --image-budget"),
                rescue());
   } catch (...) {  // of a callback
-    clock.training.stop();
+    stop_clock();
     spdlog::warn("a callback failed after iteration {}: {}", iteration, rescue());
     throw;
   }
-  clock.training.stop();
+  stop_clock();
   progress.finish();
 }
 
@@ -221,6 +230,7 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
     start();
   }
   run_and_rescue(kWholeRun, true, show_progress, [&] { return interrupt.requested(); });
+  const auto turn = context.lock();
   ranks.barrier();  // what rank 0 writes is written
   const bool complete = iteration == last_iteration(options) && !cut_off;
   const bool over = complete || (ended && !cut_off);
@@ -240,7 +250,7 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
     throw Error(
         ErrorCode::kInterrupted,
         fmt::format("Interrupted at iteration {}; everything is saved: continue with --resume {}",
-                    iteration, run.path().string()));
+                    iteration, shell_word(run.path().string())));
   }
   TrainSummary summary;
   summary.iterations = iteration;

@@ -12,6 +12,7 @@
 #include "run/former_metrics.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
+#include "util/shell_word.hpp"
 
 namespace raysplats {
 namespace {
@@ -100,7 +101,7 @@ void Trainer::Impl::warn_of_no_progress() const {
   spdlog::warn(
       "the model learned nothing: the PSNR of no training view rose by more than {} dB; see "
       "whether cameras, points and photos belong together ('raysplats info {}')",
-      PsnrRise::kLeast, dataset.root.string());
+      PsnrRise::kLeast, shell_word(dataset.root.string()));
 }
 
 // Measures the model by the views of a data set that are held out, of which each rank traces a

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
 #include "run/dataset_fingerprint.hpp"
@@ -13,6 +14,7 @@
 #include "train/run_state.hpp"
 #include "train/trainer_impl.hpp"
 #include "util/file_kind.hpp"
+#include "util/shell_word.hpp"
 
 namespace raysplats {
 namespace {
@@ -22,6 +24,11 @@ namespace {
 std::string fingerprint_for(const std::string& config, const Dataset& dataset) {
   return dataset_fingerprint(dataset,
                              !config.empty() && parse_train_config(config).depth_weight > 0);
+}
+
+// What decides which photos a run has, and what of them counts.
+auto reading(const DatasetOptions& o) {
+  return std::tuple(o.factor(), o.test_every, o.undistort, o.masks, o.alpha);
 }
 
 }  // namespace
@@ -84,7 +91,7 @@ std::string Trainer::Impl::rescue() {
   const auto turn = context.lock();
   if (!ranks.leads()) {
     return fmt::format("what rank 0 has saved is in {}: continue with --resume {}",
-                       run.path().string(), run.path().string());
+                       run.path().string(), shell_word(run.path().string()));
   }
   if (whole) {
     try {
@@ -109,13 +116,21 @@ std::string Trainer::Impl::rescue() {
   }
   if (saved < 0) return "nothing was saved yet";
   return fmt::format("iteration {} is saved: continue with --resume {}", saved,
-                     run.path().string());
+                     shell_word(run.path().string()));
 }
 
 // The photos as the run saw them: another size or choice of them is another run.
 void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
   if (checkpoint.config.empty()) return;
   const TrainOptions before = parse_train_config(checkpoint.config);
+  TrainOptions now = options;
+  // Programs of older versions left downscale open, whatever they read.
+  if (before.data.downscale == 0 && reading(before.data) == reading(said_data) &&
+      reading(said_data) != reading(now.data)) {
+    spdlog::warn(
+        "the run does not say how its data set was read: whether it was read as now is not known");
+    now.data = said_data;
+  }
   const auto differs = [&](const char* option, const auto& was, const auto& is) {
     if (was == is) return;
     throw UsageError(fmt::format(
@@ -123,33 +138,33 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
         "the run, or start a new one with --init",
         checkpoint.iteration, option, was, is));
   };
-  differs("downscale", before.data.downscale, options.data.downscale);
-  differs("test-every", before.data.test_every, options.data.test_every);
-  differs("undistort", before.data.undistort, options.data.undistort);
-  differs("validate-views", before.validate_views, options.validate_views);
-  differs("exposure", before.exposure, options.exposure);
-  differs("views-per-step", before.views_per_step, options.views_per_step);
-  differs("poses", before.poses, options.poses);
+  differs("downscale", before.data.factor(), now.data.factor());
+  differs("test-every", before.data.test_every, now.data.test_every);
+  differs("undistort", before.data.undistort, now.data.undistort);
+  differs("validate-views", before.validate_views, now.validate_views);
+  differs("exposure", before.exposure, now.exposure);
+  differs("views-per-step", before.views_per_step, now.views_per_step);
+  differs("poses", before.poses, now.poses);
   const auto degree = [](const TrainOptions& o) {
     return o.background == "sky" ? o.sky_degree : -1;  // -1 = no sky
   };
-  differs("background = sky and sky-degree", degree(before), degree(options));
+  differs("background = sky and sky-degree", degree(before), degree(now));
   const auto cuts = [](const TrainOptions& o) { return o.data.masks == MaskUse::kCutout; };
-  differs("masks = cutout", cuts(before), cuts(options));
+  differs("masks = cutout", cuts(before), cuts(now));
   const auto alpha = [](const TrainOptions& o, AlphaUse use) { return o.data.alpha == use; };
   // Runs name their background, but for those of cut-out photos; what `auto` makes of transparency
   // may differ between versions.
   const bool was_cut_out = before.background == "auto" && checkpoint.iteration > 0;
   const bool by_auto = was_cut_out && alpha(before, AlphaUse::kAuto);
-  if (by_auto && !cut_out && alpha(options, AlphaUse::kAuto)) {
+  if (by_auto && !cut_out && alpha(now, AlphaUse::kAuto)) {
     spdlog::warn(
         "the run names no background, as those of cut-out photos, which the photos of {} are not: "
         "if they were, resume with --alpha cutout",
         dataset.root.string());
   }
-  if (!(by_auto && alpha(options, AlphaUse::kCutout)))
-    differs("alpha = cutout", alpha(before, AlphaUse::kCutout), alpha(options, AlphaUse::kCutout));
-  differs("alpha = ignore", alpha(before, AlphaUse::kIgnore), alpha(options, AlphaUse::kIgnore));
+  if (!(by_auto && alpha(now, AlphaUse::kCutout)))
+    differs("alpha = cutout", alpha(before, AlphaUse::kCutout), alpha(now, AlphaUse::kCutout));
+  differs("alpha = ignore", alpha(before, AlphaUse::kIgnore), alpha(now, AlphaUse::kIgnore));
 }
 
 // Models that come after the state to go on from are written again by a run of the length that they

@@ -3,12 +3,16 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <random>
 #include <string>
+#include <utility>
 
 #include "raysplats/error.hpp"
 
@@ -37,6 +41,15 @@ bool is_temporary_name(const std::string& name) {
   const std::size_t dot = name.rfind('.', mark - 1);
   if (dot == std::string::npos || dot == 0 || dot + 1 == mark) return false;
   return name.find_first_not_of("0123456789", dot + 1) == mark;
+}
+
+// Removes a temporary file that no AtomicFile holds. Whether one does, only a lock can tell.
+bool removed_unheld(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW);
+  if (descriptor < 0) return false;
+  const bool removed = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0 && ::unlink(path.c_str()) == 0;
+  ::close(descriptor);
+  return removed;
 }
 
 // A part of a temporary name. Of whole parts it would be longer than the target's name, which may
@@ -81,14 +94,25 @@ AtomicFile::AtomicFile(std::filesystem::path target) : target_(real_target(std::
   }
   synced_folders_.insert(synced_folders_.begin(), folder);
   std::filesystem::create_directories(folder, error);
+  if (error) {
+    errno = error.value();
+    fail("be created");
+  }
+  struct stat replaced {};
+  if (::stat(target_.c_str(), &replaced) == 0) mode_ = replaced.st_mode & 0777;
   // By chance: processes on several machines that share the folder may have one number.
   std::random_device chance;
   do {
     temporary_ = folder / fmt::format(".{}.{}.tmp{}", shortened(target_.stem().string()), chance(),
                                       shortened(target_.extension().string()));
-    descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    // Readable by nobody who may not read what it replaces; libraries may open it anew to write.
+    descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC,
+                         mode_ ? *mode_ | S_IRUSR | S_IWUSR : 0666);
   } while (descriptor_ < 0 && errno == EEXIST);
   if (descriptor_ < 0) fail("be created");
+  // Without waiting and whatever comes of it: it keeps the file from remove_stale_temporaries(),
+  // which needs the lock itself.
+  ::flock(descriptor_, LOCK_EX | LOCK_NB);
 }
 
 AtomicFile::~AtomicFile() {
@@ -128,12 +152,16 @@ void AtomicFile::write_at(std::uint64_t offset, const void* data, std::size_t by
 }
 
 void AtomicFile::commit() {
+  // What it has now is no wider, for file systems that cannot change it.
+  if (mode_) ::fchmod(descriptor_, *mode_);
   if (::fsync(descriptor_) != 0 && !means_no_sync(errno)) fail("be synced");
-  const int descriptor = descriptor_;
-  descriptor_ = -1;
-  if (::close(descriptor) != 0) fail("be closed");
+  // File systems of networks may tell only now what they could not write. The descriptor itself
+  // holds the lock until the file has its name.
+  const int copy = ::fcntl(descriptor_, F_DUPFD_CLOEXEC, 0);
+  if (copy < 0 || ::close(copy) != 0) fail("be closed");
   if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail("be renamed into place");
   committed_ = true;
+  ::close(std::exchange(descriptor_, -1));
   for (const std::filesystem::path& folder : synced_folders_) sync_folder(folder);
 }
 
@@ -161,11 +189,7 @@ std::size_t remove_stale_temporaries(const std::filesystem::path& folder) {
     if (entry->is_regular_file(status) && is_temporary_name(entry->path().filename().string()))
       stale.push_back(entry->path());
   }
-  std::size_t removed = 0;
-  for (const std::filesystem::path& path : stale) {
-    if (std::filesystem::remove(path, error)) ++removed;
-  }
-  return removed;
+  return static_cast<std::size_t>(std::count_if(stale.begin(), stale.end(), removed_unheld));
 }
 
 void write_text_file(const std::filesystem::path& path, std::string_view text) {

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <functional>
 #include <initializer_list>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -15,8 +16,8 @@ namespace raysplats {
 /// A file that appears whole or not at all: everything goes to a temporary name in the same folder,
 /// commit() syncs and renames it over the target. Without commit() the temporary file is removed
 /// and the target keeps its old content. Where the target is a link, the file that it leads to is
-/// written. Failures throw DataError with the path and the system's reason (disk full,
-/// permissions), devices, pipes and folders too.
+/// written. A file that is replaced leaves its permissions to the new one. Failures throw DataError
+/// with the path and the system's reason (disk full, permissions), devices, pipes and folders too.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path target);
@@ -38,6 +39,7 @@ class AtomicFile {
   std::filesystem::path target_;
   std::filesystem::path temporary_;
   std::vector<std::filesystem::path> synced_folders_;  // by commit(): the target's and new ones
+  std::optional<unsigned> mode_;                       // of the file that is replaced
   int descriptor_ = -1;
   bool committed_ = false;
 };
@@ -49,8 +51,8 @@ void check_output_file(const std::filesystem::path& path,
                        bool overwrite,
                        std::initializer_list<std::filesystem::path> inputs = {});
 
-/// Removes the temporary files that processes which were killed left in `folder` and below. Only
-/// for folders that no other process writes to. Returns how many there were.
+/// Removes the temporary files that processes which were killed left in `folder` and below, and
+/// none that an AtomicFile of any process still holds. Returns how many there were.
 std::size_t remove_stale_temporaries(const std::filesystem::path& folder);
 
 /// Writes a whole text file atomically.

@@ -3,9 +3,11 @@
 
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
+#include <mutex>
 #include <string_view>
 
 namespace raysplats {
@@ -16,9 +18,17 @@ namespace {
 std::atomic<bool> interrupted{false};
 std::atomic<bool> asked{false};  // by SIGINT or SIGTERM
 std::atomic<int> guards{0};
-std::atomic<int> pipe_guards{0};     // those of LostReader::kInterrupts
 std::atomic<bool> announced{false};  // whether somebody sees what the handler says
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler must not take locks");
+
+// What follows is for who makes a guard or lets one go, one thread at a time.
+std::mutex turn;
+int pipe_guards = 0;  // those of LostReader::kInterrupts
+struct Handled {
+  int signal;
+  struct sigaction previous;  // while there are guards
+};
+std::array<Handled, 3> handled{{{SIGINT, {}}, {SIGTERM, {}}, {SIGHUP, {}}}};
 
 bool ignores_hang_ups() {
   struct sigaction present {};
@@ -70,29 +80,29 @@ extern "C" void mark_interrupt(int signal) {
 
 }  // namespace
 
-InterruptGuard::InterruptGuard(LostReader reader)
-    : outer_(guards++ == 0), hears_pipe_(reader == LostReader::kInterrupts) {
-  if (outer_) interrupted = asked = false;
+InterruptGuard::InterruptGuard(LostReader reader) : hears_pipe_(reader == LostReader::kInterrupts) {
+  const std::lock_guard<std::mutex> guard(turn);
+  const bool first = guards == 0;
+  if (first) interrupted = asked = false;
+  ++guards;
   if (hears_pipe_ && pipe_guards++ == 0) replace_pipe_handler(SIG_DFL, mark_interrupt);
-  if (!outer_) return;
+  if (!first) return;
   announced = ::isatty(STDERR_FILENO) == 1;
-  struct sigaction action {};
-  action.sa_handler = mark_interrupt;
-  sigemptyset(&action.sa_mask);
-  action.sa_flags = SA_RESTART;
-  sigaction(SIGINT, &action, &previous_int_);
-  sigaction(SIGTERM, &action, &previous_term_);
-  if (began_ignoring || ignores_hang_ups()) action.sa_handler = SIG_IGN;
-  sigaction(SIGHUP, &action, &previous_hup_);
+  const bool deaf = began_ignoring || ignores_hang_ups();
+  for (auto& [signal, previous] : handled) {
+    struct sigaction action {};
+    action.sa_handler = signal == SIGHUP && deaf ? SIG_IGN : mark_interrupt;
+    sigemptyset(&action.sa_mask);
+    action.sa_flags = SA_RESTART;
+    sigaction(signal, &action, &previous);
+  }
 }
 
 InterruptGuard::~InterruptGuard() {
-  --guards;
+  const std::lock_guard<std::mutex> guard(turn);
   if (hears_pipe_ && --pipe_guards == 0) replace_pipe_handler(mark_interrupt, SIG_DFL);
-  if (!outer_) return;
-  sigaction(SIGINT, &previous_int_, nullptr);
-  sigaction(SIGTERM, &previous_term_, nullptr);
-  sigaction(SIGHUP, &previous_hup_, nullptr);
+  if (--guards > 0) return;
+  for (const auto& [signal, previous] : handled) sigaction(signal, &previous, nullptr);
 }
 
 bool InterruptGuard::requested() const { return interrupted; }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <csignal>
-
 namespace raysplats {
 
 /// What SIGPIPE does while an InterruptGuard lives.
@@ -14,8 +12,9 @@ enum class LostReader {
 /// While one lives, SIGINT, SIGTERM and SIGHUP only set a mark that long work polls, and the first
 /// two say so at once on a terminal; a second one of these two ends the process as usual. SIGHUP
 /// stays ignored where it was (nohup). From the first signal on SIGPIPE is ignored for good, so
-/// that the work ends well though nobody reads what it says any more. One that is made while
-/// another lives, in this thread or others, shares its mark and must not outlive it.
+/// that the work ends well though nobody reads what it says any more. Those that live at the same
+/// time, in any threads, share a mark; what signals did before the first of them they do again
+/// when the last one has gone.
 class InterruptGuard {
  public:
   explicit InterruptGuard(LostReader reader = LostReader::kUsual);
@@ -23,15 +22,11 @@ class InterruptGuard {
   InterruptGuard(const InterruptGuard&) = delete;
   InterruptGuard& operator=(const InterruptGuard&) = delete;
 
-  /// Whether a signal has arrived since the guard was made.
+  /// Whether a signal has arrived since the first of those that live was made.
   bool requested() const;
 
  private:
-  bool outer_ = false;       // the first of those that live
-  bool hears_pipe_ = false;  // kInterrupts
-  struct sigaction previous_int_ {};
-  struct sigaction previous_term_ {};
-  struct sigaction previous_hup_ {};
+  bool hears_pipe_;  // kInterrupts
 };
 
 /// For the begin of main(): where SIGHUP is ignored (nohup) it stays so, though drivers set

@@ -52,13 +52,6 @@ std::optional<T> parse_integer(std::string_view text) {
   return static_cast<T>(*real);
 }
 
-/// Digits with what numbers have beside them, a letter for thousands or millions, and pairs 4:0.1.
-bool looks_like_number(std::string_view text) {
-  if (text.find_first_not_of("0123456789.:+-eE_kM") != std::string_view::npos) return false;
-  const std::size_t first = text.find_first_not_of("+-.");
-  return first <= 2 && first < text.size() && kDigits.find(text[first]) != std::string_view::npos;
-}
-
 }  // namespace
 
 std::string counted(double count, std::string_view one, std::string_view many) {
@@ -128,11 +121,24 @@ std::optional<std::vector<std::string>> list_items(const std::vector<std::string
   return items;
 }
 
+namespace {
+
+/// A number, with a letter for thousands or millions behind it, or a pair as in 4:0.1.
+bool is_number_or_pair(std::string_view text) {
+  if (const std::size_t colon = text.find(':'); colon != std::string_view::npos) {
+    return is_number_or_pair(text.substr(0, colon)) && is_number_or_pair(text.substr(colon + 1));
+  }
+  if (text.ends_with('k') || text.ends_with('M')) text.remove_suffix(1);
+  return parse_real(text).has_value();
+}
+
+}  // namespace
+
 bool is_number_list_part(std::string_view word) {
   if (word.empty()) return false;
   while (!word.empty()) {
     const std::size_t end = std::min(word.find_first_of("[],= "), word.size());
-    if (end > 0 && !looks_like_number(word.substr(0, end))) return false;
+    if (end > 0 && !is_number_or_pair(word.substr(0, end))) return false;
     word.remove_prefix(std::min(end + 1, word.size()));
   }
   return true;

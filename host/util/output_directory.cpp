@@ -47,6 +47,11 @@ void check_output_directory(const std::filesystem::path& path) {
   while (!place.empty() && !std::filesystem::exists(place, error)) place = place.parent_path();
   const bool whole = place == path;
   if (place.empty()) place = ".";
+  const long longest = ::pathconf(place.c_str(), _PC_NAME_MAX);
+  for (const std::filesystem::path& name : path) {
+    if (longest > 0 && name.native().size() > static_cast<std::size_t>(longest))
+      refuse(path, "created", message_of(std::errc::filename_too_long));
+  }
   if (!std::filesystem::is_directory(place, error))
     refuse(path, "created", message_of(std::errc::not_a_directory));
   if (::access(place.c_str(), W_OK | X_OK) != 0)

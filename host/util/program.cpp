@@ -13,11 +13,13 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <deque>
 #include <fstream>
+#include <thread>
 #include <utility>
 
 #include "raysplats/error.hpp"
@@ -28,6 +30,8 @@ namespace raysplats {
 namespace {
 
 constexpr int kPollMilliseconds = 200;
+constexpr std::chrono::milliseconds kGrace{1000};  // for a program that is to end
+constexpr std::chrono::milliseconds kGlance{10};
 constexpr std::size_t kLastLines = 3;
 constexpr std::size_t kLongestLine = 4096;
 
@@ -125,6 +129,18 @@ int wait_for(pid_t child) {
   return status;
 }
 
+/// Ends the child, by force where it does not go by itself.
+void end(pid_t child) {
+  ::kill(child, SIGTERM);
+  const auto last = std::chrono::steady_clock::now() + kGrace;
+  while (std::chrono::steady_clock::now() < last) {
+    if (::waitpid(child, nullptr, WNOHANG) == child) return;
+    std::this_thread::sleep_for(kGlance);
+  }
+  ::kill(child, SIGKILL);
+  wait_for(child);
+}
+
 std::string ending(int status) {
   return WIFSIGNALED(status) ? fmt::format("was ended by signal {}", WTERMSIG(status))
                              : fmt::format("ended with exit code {}", WEXITSTATUS(status));
@@ -214,11 +230,9 @@ ProgramInput::ProgramInput(const std::filesystem::path& program,
 }
 
 ProgramInput::~ProgramInput() {
-  if (child_ > 0) {
-    ::kill(child_, SIGTERM);
-    wait_for(child_);
-  }
+  // One that waits for more, as ffmpeg does whatever signal it gets, has to see the end first.
   if (input_ >= 0) ::close(input_);
+  if (child_ > 0) end(child_);
   if (said_ >= 0) ::close(said_);
 }
 

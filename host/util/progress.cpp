@@ -15,6 +15,7 @@ constexpr double kDrawSeconds = 0.1;   // between redraws of the bar
 constexpr double kLineSeconds = 10.0;  // between plain lines
 constexpr double kRateSeconds = 1.0;   // between updates of the rate
 constexpr double kRateMemory = 20.0;   // seconds that the rate averages over
+constexpr double kLongest = 1e12;      // seconds that are told apart
 constexpr double kCountable = 1000.0;  // steps a second, of which more tell nobody anything
 
 int terminal_width(std::FILE* stream) {
@@ -26,38 +27,40 @@ int terminal_width(std::FILE* stream) {
 }  // namespace
 
 std::string format_duration(double seconds) {
-  const auto total = static_cast<long long>(std::llround(std::max(0.0, seconds)));
+  const auto total = std::llround(std::min(std::max(0.0, seconds), kLongest));
   if (total >= 3600)
     return fmt::format("{}:{:02}:{:02}", total / 3600, total / 60 % 60, total % 60);
   return fmt::format("{}:{:02}", total / 60, total % 60);
 }
 
-Progress::Progress(std::string label, std::int64_t total, std::int64_t done, std::FILE* stream)
+Progress::Progress(
+    std::string label, std::int64_t total, std::int64_t done, std::FILE* stream, Now now)
     : label_(std::move(label)),
       total_(total),
       done_(done),
       stream_(stream),
       terminal_(stream != nullptr && ::isatty(::fileno(stream)) == 1),
+      now_(now),
       rate_done_(done),
-      start_(std::chrono::steady_clock::now()) {}
+      start_(now()) {}
 
 Progress::~Progress() {
   if (stream_ != nullptr && terminal_ && drawn_ && !finished_ && !suspended_)
     std::fputc('\n', stream_);
 }
 
-double Progress::clock() const {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-}
+double Progress::clock() const { return std::chrono::duration<double>(now_() - start_).count(); }
 
 void Progress::update(std::int64_t done, const std::string& fields) {
   done_ = done;
   fields_ = fields;
   const double now = clock();
   const double elapsed = now - rate_time_;
-  if (elapsed >= kRateSeconds || (rate_ == 0 && elapsed > 0 && done_ > rate_done_)) {
+  // A step that lasts is no sign of a lower rate before it is done.
+  if (done_ > rate_done_ && elapsed > 0 && (elapsed >= kRateSeconds || rate_ == 0)) {
     const double recent = static_cast<double>(done_ - rate_done_) / elapsed;
-    const double weight = rate_ > 0 ? 1.0 - std::exp(-elapsed / kRateMemory) : 1.0;
+    // A mean over the time so far, of which what is long ago counts less.
+    const double weight = std::expm1(-elapsed / kRateMemory) / std::expm1(-now / kRateMemory);
     rate_ += weight * (recent - rate_);
     rate_time_ = now;
     rate_done_ = done_;
@@ -75,7 +78,7 @@ void Progress::finish() {
 void Progress::suspend() {
   if (suspended_) return;
   suspended_ = true;
-  suspended_at_ = std::chrono::steady_clock::now();
+  suspended_at_ = now_();
   if (stream_ != nullptr && terminal_ && drawn_) {
     std::fputs("\r\x1b[K", stream_);
     std::fflush(stream_);
@@ -85,7 +88,7 @@ void Progress::suspend() {
 void Progress::resume() {
   if (!suspended_) return;
   suspended_ = false;
-  start_ += std::chrono::steady_clock::now() - suspended_at_;
+  start_ += now_() - suspended_at_;
 }
 
 std::string Progress::line(int width) const {

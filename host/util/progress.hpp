@@ -19,19 +19,22 @@ class Progress {
   /// A total that nobody knows: the bar runs to and fro.
   static constexpr std::int64_t kUnknown = -1;
 
+  using Now = std::chrono::steady_clock::time_point (*)();
+
   /// `done` of `total` steps are behind us already (a resumed run). A null stream prints nothing.
   Progress(std::string label,
            std::int64_t total,
            std::int64_t done = 0,
-           std::FILE* stream = stderr);
+           std::FILE* stream = stderr,
+           Now now = std::chrono::steady_clock::now);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
   /// Another number of steps in all, from the next update() on.
   void set_total(std::int64_t total) { total_ = total; }
-  /// Reports that `done` steps are behind us; `fields` is what follows the bar ("loss 0.12,
-  /// PSNR 21.3").
+  /// Reports that `done` steps are behind us, also while one of them lasts; `fields` is what
+  /// follows the bar ("loss 0.12, PSNR 21.3").
   void update(std::int64_t done, const std::string& fields);
   /// Draws the last state with a line end.
   void finish();
@@ -57,6 +60,7 @@ class Progress {
   std::int64_t done_;
   std::FILE* stream_;
   bool terminal_;
+  Now now_;
   bool drawn_ = false;
   std::int64_t drawn_done_ = -1;
   bool finished_ = false;

@@ -63,7 +63,7 @@ struct View {
   std::filesystem::path mask_path;   ///< optional mask (black = ignore); empty when there is none
   std::filesystem::path depth_path;  ///< optional depth map (PNG or .npy); empty when there is none
   std::vector<std::uint32_t> points;  ///< numbers of the sparse points that it is known to show
-  bool mask_apart = false;  ///< alpha is coverage, and what the mask ignores is a plane of its own
+  bool mask_apart = false;  ///< alpha is coverage, and what does not count is a plane of its own
   bool mask_cuts = false;   ///< what the mask leaves out is background (MaskUse::kCutout)
   Camera source_camera;     ///< of the photo on disk, with its lens
   int sample_bytes = 1;     ///< of a number in the photo on disk: 1, 2 or 4 (floats)
@@ -81,21 +81,6 @@ struct PointCloud {
   std::size_t size() const { return positions.size() / 3; }
 };
 
-/// Photos, cameras and points of one scene. Images stay on disk until load_view_image().
-struct Dataset {
-  DatasetKind kind = DatasetKind::kColmap;  ///< as found
-  std::filesystem::path root;               ///< the folder
-  std::vector<View> views;                  ///< sorted by name within a split
-  PointCloud points;                        ///< empty where the data set has none
-  bool alpha_is_background = false;  ///< RGBA is composited over the background (AlphaUse, or
-                                     ///< MaskUse::kCutout), else alpha is a mask
-  std::array<double, 3> origin{};    ///< what was taken off all positions of the files
-  int test_every = 0;  ///< every n-th view is held out; 0 = files name those, or none is
-
-  /// Positions in `views` of those of a split, in their order.
-  std::vector<std::size_t> indices(Split split) const;
-};
-
 /// How a data set is read.
 struct DatasetOptions {
   /// By what image sizes are divided; 0 stands for 1, which `train` changes where photos are large.
@@ -110,12 +95,29 @@ struct DatasetOptions {
   AlphaUse alpha = AlphaUse::kAuto;  ///< what transparent in photos means
   /// What a black border means that all photos have. None is looked for where photos are cut out.
   BorderUse borders = BorderUse::kAuto;
-  /// What is taken off all positions; none = 0, but a point near the cameras where the scene lies
-  /// so far from the origin of its files (surveyed captures) that single precision would blur it.
+  /// What is taken off all positions, finite numbers up to 1e9; none = 0, but a point near the
+  /// cameras where the scene lies so far from the origin of its files (surveyed captures) that
+  /// single precision would blur it.
   std::optional<std::array<double, 3>> origin;
 
   /// What sizes are divided by.
   double factor() const { return downscale > 0 ? downscale : 1.0; }
+};
+
+/// Photos, cameras and points of one scene. Images stay on disk until load_view_image().
+struct Dataset {
+  DatasetKind kind = DatasetKind::kColmap;  ///< as found
+  std::filesystem::path root;               ///< the folder
+  std::vector<View> views;                  ///< sorted by name within a split
+  PointCloud points;                        ///< empty where the data set has none
+  bool alpha_is_background = false;  ///< RGBA is composited over the background (AlphaUse, or
+                                     ///< MaskUse::kCutout), else alpha is a mask
+  std::array<double, 3> origin{};    ///< what was taken off all positions of the files
+  int test_every = 0;  ///< every n-th view is held out; 0 = files name those, or none is
+  std::optional<DatasetOptions> read_as;  ///< by load_dataset(), with the downscale it took
+
+  /// Positions in `views` of those of a split, in their order.
+  std::vector<std::size_t> indices(Split split) const;
 };
 
 /// Detects the kind of data set (COLMAP, nerfstudio, Blender, LLFF, Polycam) and reads everything

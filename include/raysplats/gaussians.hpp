@@ -28,7 +28,7 @@ struct Gaussians {
 };
 
 /// Adds or drops bands so that the model has `degree`; new coefficients are zero. Throws UsageError
-/// when the degree is not 0 to 4.
+/// when the degree is not 0 to 4, or the arrays of the model do not fit each other.
 Gaussians with_sh_degree(const Gaussians& model, int degree);
 
 }  // namespace raysplats

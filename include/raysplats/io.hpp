@@ -95,7 +95,9 @@ void write_image(const std::filesystem::path& path,
 /// neither lenses nor principal points.
 std::vector<Camera> read_cameras(const std::filesystem::path& path);
 
-/// Writes cameras as a nerfstudio transforms.json that read_cameras() reads back.
+/// Writes cameras as a nerfstudio transforms.json that read_cameras() reads back. Throws
+/// UsageError, and writes nothing, for a camera without pixels or focal length, with a number that
+/// is not finite, with a rotation that is none (Tracer), or of kPhotoLens without its lens.
 void write_cameras(const std::filesystem::path& path, const std::vector<Camera>& cameras);
 
 }  // namespace raysplats

@@ -29,14 +29,14 @@ struct Material {
   };
   std::string name;             ///< for messages
   Kind kind = Kind::kDiffuse;   ///< decides which of the others count
-  Rgb color{0.8f, 0.8f, 0.8f};  ///< display values of the surface, >= 0
+  Rgb color{0.8f, 0.8f, 0.8f};  ///< display values of the surface, in [0, 1]
   int texture = -1;             ///< multiplies `color`; index into the textures, -1 = none
   float specular = 0.0f;        ///< weight of the specular lobe of kDiffuse and kTransparent, >= 0
   float roughness = 0.0f;       ///< in [0, 1]: of the mirror, or width of the specular lobe
   float ior = 1.5f;             ///< index of refraction of kGlass, > 0
   Rgb absorption{0, 0, 0};      ///< of kGlass per world unit (Beer's law), >= 0
   float opacity = 1.0f;         ///< of kTransparent, in [0, 1]
-  Rgb emission{0, 0, 0};        ///< display values added wherever the surface is seen, >= 0
+  Rgb emission{0, 0, 0};        ///< display values, in [0, 1e6], added wherever it is seen
   std::optional<float> shadow;  ///< share of light it takes, in [0, 1]; see shadow_opacity()
 };
 
@@ -72,8 +72,8 @@ struct Light {
 
 /// What rays that leave the scene see.
 struct Environment {
-  Rgb color{0, 0, 0};  ///< display values, >= 0: constant, or factor of the image
-  Image equirect;      ///< 3 channels, display values, any size; empty = `sky`, or constant
+  Rgb color{0, 0, 0};  ///< display values, in [0, 1e6]: constant, or factor of the image
+  Image equirect;      ///< 3 channels, as `color`, any size; empty = `sky`, or constant
   std::array<float, 3> up{0, 1, 0};  ///< where the top of the image is, in world axes
   float rotation = 0.0f;             ///< degrees about `up`, right-handed
   SkyLight sky{};                    ///< in world axes, turned by `rotation`; empty = constant
@@ -95,12 +95,13 @@ struct RenderSettings {
   int max_bounces = 8;  ///< surfaces that a path may meet, >= 1
   /// In [0, 1]: a path that carries a smaller share of light ends; no pixel loses more by it.
   float min_throughput = 0.0005f;
-  std::uint64_t seed = 0;         ///< of everything that is random
-  Rgb ambient{0.2f, 0.2f, 0.2f};  ///< display values: light besides lights and environment
-  bool indirect = false;          ///< diffuse surfaces gather light by rays instead of `ambient`
-  int light_samples = 4;          ///< shadow rays per sphere light, surface and sample
-  float aperture = 0.0f;          ///< radius of the lens, world units; 0 = everything is sharp
-  float focus_distance = 1.0f;    ///< depth of what is sharp, world units
+  std::uint64_t seed = 0;  ///< of everything that is random
+  /// Display values, in [0, 1e6]: light besides lights and environment.
+  Rgb ambient{0.2f, 0.2f, 0.2f};
+  bool indirect = false;        ///< diffuse surfaces gather light by rays instead of `ambient`
+  int light_samples = 4;        ///< shadow rays per sphere light, surface and sample
+  float aperture = 0.0f;        ///< radius of the lens, world units; 0 = everything is sharp
+  float focus_distance = 1.0f;  ///< depth of what is sharp, world units
   /// World units from a Gaussian to where its shadow rays start; 0 = 1/1000 of the size of all
   /// Gaussians.
   float bias = 0.0f;
@@ -112,7 +113,7 @@ struct Scene {
   Gaussians gaussians;              ///< all models together
   std::vector<Mesh> meshes;         ///< `materials` index the scene's
   std::vector<Material> materials;  ///< `texture` indexes the scene's
-  std::vector<Image> textures;      ///< 3 channels, display values
+  std::vector<Image> textures;      ///< 3 channels, display values, in [0, 1e6]
   std::vector<Light> lights;        ///< beside `environment` and RenderSettings::ambient
   Environment environment;          ///< behind everything
   RenderSettings render;            ///< how the picture is made

@@ -85,13 +85,18 @@ class Tracer {
   /// Rays of any origins and directions. Throws UsageError, naming the ray, for a number that is
   /// not finite (t_max may be infinite), a direction of length 0, and ends that are not
   /// 0 <= t_min <= t_max; for a model of another context; and for options.near_depth, options.sky
-  /// and mirrors, which belong to cameras.
+  /// and mirrors, which belong to cameras. `within` hears the share of the rays that is done, as in
+  /// render(), and returns false to stop; then there are no results.
   std::vector<RayResult> trace(const Model& model,
                                std::span<const Ray> rays,
                                ColorDirection direction = ColorDirection::kRay,
-                               bool differentiable = false);
+                               bool differentiable = false,
+                               const std::function<bool(double share)>& within = {});
   /// Gradients of the last rays, one gradient for each of them. Throws as the other backward().
-  RaysGradients backward(const Model& model, std::span<const RayResultGradient> gradients);
+  /// `within` as in trace(): stopped, the gradients are empty, and may be asked for again.
+  RaysGradients backward(const Model& model,
+                         std::span<const RayResultGradient> gradients,
+                         const std::function<bool(double share)>& within = {});
 
   /// Rays of the last render() or trace() that stopped because of options.max_hits, those that
   /// mirrors have reflected with them.

@@ -86,7 +86,9 @@ struct TrainOptions {
   std::uint64_t seed = 42;  ///< of the order of views, a random start and splits
 
   // Data
-  DatasetOptions data;     ///< how the data set was read; a resumed run has to have the same
+  /// How the data set was read, as a run says for its evaluation; a resumed one has to have the
+  /// same. Trainer takes it from what load_dataset() gave.
+  DatasetOptions data;
   int validate_views = 0;  ///< training views kept out of the loss, by which the run is judged
   int patience = 0;        ///< validations in a row without gain that end the run; 0 = off
   /// "auto" (white behind cut-out photos, else the photos' typical colour), "random", "sky" or

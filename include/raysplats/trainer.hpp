@@ -62,10 +62,12 @@ struct TrainLoss {
 /// schedule says, or step(), evaluate() and save() are called in a loop of one's own.
 ///
 /// Threads: as Context, iteration by iteration; stop() may be called from any thread. A trainer
-/// that is in run() or step() refuses another one, from another thread or from its own callback.
+/// that is in run() or step() refuses another one and resume(), from another thread or from its own
+/// callback.
 class Trainer {
  public:
-  /// Throws UsageError for options that cannot be trained, ResourceError when the device has too
+  /// Throws UsageError for options that cannot be trained or say otherwise than the data set how it
+  /// was read, ResourceError when the device has too
   /// little memory, DataError when the run folder cannot be written to. With `overwrite` the run
   /// takes the place of one that is in the folder, whose files are removed when training starts;
   /// without, a folder that holds another run is refused then. Views whose masks ignore all of

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "program.hpp"
@@ -59,6 +60,29 @@ TEST_CASE("a model that cannot be read is exit code 3") {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   std::memcpy(with_nan.data() + with_nan.size() - 56, &nan, sizeof(nan));
   refused(with_nan);
+}
+
+TEST_CASE("a path that cannot be followed is exit code 3 with the system's reason") {
+  const TemporaryFolder folder;
+  std::filesystem::create_symlink("round.ply", folder / "round.ply");
+  const std::string model = folder / "model.ply";
+  write_file(model, ply_file(3));
+  for (const auto& [path, reason] :
+       {std::pair(folder / "round.ply", "Too many levels of symbolic links"),
+        std::pair(folder / (std::string(300, 'x') + ".ply"), "File name too long")}) {
+    for (const std::vector<std::string>& words : std::vector<std::vector<std::string>>{
+             {"info", path},
+             {"prepare", path, "-o", folder / "data"},
+             {"bench", "--model", model, "--cameras", path, "--list"},
+             {"render", path, "--orbit", "2", "-o", folder / "pictures"},
+             {"view", path},
+             {"eval", path, "--data", folder / "data", "-o", folder / "scores"},
+             {"train", path, "-o", folder / "run", "-q"},
+             {"report", path, "-o", folder / "page.html"}}) {
+      CAPTURE(words.front());
+      check_refused(words, 3, reason);
+    }
+  }
 }
 
 TEST_CASE("a data set that cannot be read is exit code 3") {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
+#include <unistd.h>
 
+#include <csignal>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -146,6 +148,20 @@ TEST_CASE("convert keeps what the views of a run see") {
   CHECK(idle.code == 2);
   CHECK(one_sentence(idle));
   CHECK(contains(idle.err, "--max-gaussians"));
+}
+
+TEST_CASE("convert leaves no half file where a signal comes") {
+  const TemporaryFolder folder;
+  write_file(folder / "in/balls.ply", ply_file(1500000));
+  std::filesystem::create_directory(folder / "out");
+  RunningProgram program({"convert", folder / "in/balls.ply", folder / "out/balls.ply"});
+  while (program.runs() && entries(folder / "out") == 0) ::usleep(200);
+  ::kill(program.process(), SIGTERM);
+  const Outcome outcome = program.wait();
+  INFO(outcome.err);
+  CHECK(outcome.signal == 0);
+  CHECK(entries(folder / "out") == (outcome.code == 0 ? 1 : 0));
+  CHECK(std::filesystem::exists(folder / "out/balls.ply") == (outcome.code == 0));
 }
 
 TEST_CASE("convert says in one sentence what it will not do") {

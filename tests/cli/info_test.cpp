@@ -175,7 +175,12 @@ TEST_CASE("info describes every kind of file that is read") {
   json = json_of(folder / "metrics.csv");
   CHECK(json["type"] == "course of a run");
   CHECK(json["rows"] == 2);
+  CHECK(json["columns"] == nlohmann::json{"iteration", "psnr"});
   CHECK(json["iterations"] == 20);
+  CHECK(contains(told(folder / "metrics.csv"), "iterations       20\n"));
+  write_file(folder / "begun.csv", "iteration,psnr\n");
+  json = json_of(folder / "begun.csv");
+  CHECK(json["rows"] == 0);
   CHECK(json["columns"] == nlohmann::json{"iteration", "psnr"});
   write_file(folder / "path.toml",
              "seconds = 1\nfps = 4\n[[key]]\neye = [0,0,-5]\ntarget = [0,0,0]\n"
@@ -188,6 +193,8 @@ TEST_CASE("info describes every kind of file that is read") {
   CHECK(json["type"] == "configuration");
   CHECK(json["iterations"] == 123);
   CHECK(json["given"] == nlohmann::json{"iterations"});
+  write_file(folder / "parts.toml", "iterations = 123\n[train]\nseed = 4\n");
+  CHECK(json_of(folder / "parts.toml")["given"] == nlohmann::json{"iterations", "seed"});
   raysplats::write_image(folder / "a.png", raysplats::Image(8, 6, 3, 0.5f));
   json = json_of(folder / "a.png");
   CHECK(json["type"] == "picture");
@@ -208,7 +215,7 @@ TEST_CASE("info says what it reads, and which models a folder without a run hold
     check_refused({"info", path}, 3, part);
   };
   write_file(folder / "README.md", "# Notes\n");
-  write_file(folder / "metrics.csv", "iteration,loss\n");
+  write_file(folder / "metrics.csv", "step,loss\n");
   for (const char* name : {"README.md", "metrics.csv"})
     refused(folder / name, std::string(name) + " is nothing that info reads: those are models");
   write_file(folder / "iteration_60/point_cloud.ply", ply_file(1));
@@ -257,6 +264,12 @@ TEST_CASE("info describes the parts of captures, meshes and runs") {
   CHECK(json.at("points") == 2);
   CHECK(json.at("bounds") == nlohmann::json::parse("[[0, 0, 0], [1, 2, 3]]"));
   CHECK(json.at("colours") == true);
+  // As programs for meshes write clouds.
+  write_file(folder / "cloud.ply",
+             "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+             "property float z\nelement face 0\nproperty list uchar int vertex_indices\n"
+             "end_header\n1 2 3\n");
+  CHECK(type("cloud.ply") == "points");
 
   write_file(folder / "my ball.mtl",
              "newmtl chrome\nillum 3\nKs 0.9 0.9 0.9\nnewmtl wall\nKd 1 0 0\n");

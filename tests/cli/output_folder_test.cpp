@@ -104,6 +104,23 @@ TEST_CASE("an interrupted rendering names no video, which only whole ones are") 
   CHECK(!fs::exists(folder / "v.apng"));
 }
 
+TEST_CASE("a rendering that nobody reads any more leaves no half video") {
+  const TemporaryFolder folder;
+  write_file(folder / "m.ply", ply_file(2));
+  fs::create_directory(folder / "out");
+  // Whoever reads what the program says goes before the first line, or after some of them.
+  for (const char* reader : {"true", "head -n 1", "head -n 2", "head -n 3"}) {
+    CAPTURE(reader);
+    Surroundings around;
+    around.launcher = {"/bin/sh", "-c", std::string("\"$@\" 2>&1 | ") + reader, "sh"};
+    raysplats_program({"render", folder / "m.ply", "--orbit", "400", "--width", "32", "--video",
+                       folder / "out/v.gif"},
+                      around);
+    fs::remove(folder / "out/v.gif");  // a slow reader gets all of it
+    CHECK(entries(folder / "out") == 0);
+  }
+}
+
 TEST_CASE("a picture that no device holds is called too large") {
   const TemporaryFolder folder;
   write_file(folder / "m.ply", ply_file(2));

@@ -367,6 +367,45 @@ TEST_CASE("prepare sees that a photo or a video has become another") {
   CHECK(contains(stage.calls(), "fps="));
 }
 
+TEST_CASE("prepare takes the frames of a video anew where one of them is missing") {
+  const Stage stage;
+  stage.write_video("12.5", "");
+  // Repeated frames are left out.
+  for (const char* name : {"1", "4", "7"}) {
+    raysplats::write_image(stage.path("frame" + std::string(name) + ".jpg"),
+                           raysplats::Image(8, 6, 3, static_cast<float>(name[0] - '0') / 10.0f));
+  }
+  stage.write("bin/ffmpeg",
+              "#!/bin/sh\necho \"$@\" >> \"$CALLS\"\nfor last; do :; done\nfor i in 1 4 7; do "
+              "cp '" +
+                  stage.path("frame") +
+                  "'$i.jpg \"$(dirname \"$last\")/frame_00000$i.jpg\"; "
+                  "done\n");
+  const auto prepared = [&] {
+    return stage.run({stage.path("walk.mp4"), "-o", stage.path("data"), "--frames", "3"});
+  };
+  CHECK(prepared().code == 0);
+  REQUIRE(entries(stage.path("data/images")) == 3);
+  stage.calls();
+  CHECK(prepared().code == 0);
+  CHECK(stage.calls().empty());
+  // As older versions left it.
+  fs::remove(stage.path("data/prepare/frames"));
+  CHECK(prepared().code == 0);
+  CHECK(stage.calls().empty());
+  const fs::path images = stage.path("data/images");
+  fs::remove(fs::directory_iterator(images)->path());
+  CHECK(prepared().code == 0);
+  CHECK(contains(stage.calls(), "feature_extractor"));
+  CHECK(entries(images.string()) == 3);
+  fs::remove_all(images);
+  const Outcome outcome = prepared();
+  INFO(outcome.err);
+  CHECK(outcome.code == 0);
+  CHECK(contains(outcome.out, " of 3 photos with poses"));
+  CHECK(entries(images.string()) == 3);
+}
+
 TEST_CASE("prepare says which of many photos it compares, and which pictures it leaves out") {
   const Stage stage;
   for (int i = 0; i < 398; ++i) {

@@ -94,15 +94,45 @@ TEST_CASE("devices can be read by programs") {
   CHECK(contains(text.out, json["devices"][0]["name"].get<std::string>()));
 }
 
+TEST_CASE("a list takes no word that is called like a number") {
+  const Words train{"train", "-o", "x", "-q"};
+  check_refused(train + Words{"--bounds", "-1,-1,-1,1,1,1", "7"}, 3, "7");
+  check_refused(train + Words{"--bounds", "-1", "-1", "-1", "1", "1", "1", "7"}, 3, "7");
+  check_refused(train + Words{"--save-at", "5", "2024-05-01"}, 3, "2024-05-01");
+  check_refused({"render", "--background", "0", "24", "-o", "x", "--orbit", "3"}, 3, "model 24");
+  check_refused({"render", "--background", "0", "0", "1", "24", "-o", "x", "--orbit", "3"}, 3,
+                "model 24");
+  check_refused({"view", "--up", "0,1,0", "24"}, 3, "model 24");
+  // What may be either is a number.
+  check_refused(train + Words{"--save-at", "5", "7"}, 2,
+                "7 is taken for a number of --save-at: write ./7 for a file or folder");
+}
+
+TEST_CASE("without a folder for caches there is none to clear") {
+  const Surroundings nowhere{{{"XDG_CACHE_HOME", ""}, {"HOME", ""}}};
+  const std::string remedy = "set HOME or XDG_CACHE_HOME";
+  check_refusal(raysplats_program({"devices", "--clear-cache"}, nowhere), 3, remedy);
+  check_refusal(raysplats_program({"tune", "--reset"}, nowhere), 3, remedy);
+}
+
+TEST_CASE("commands that are named can be pasted") {
+  const TemporaryFolder folder;
+  write_file(folder / "my data/transforms.json", "{}");
+  check_refused({"render", folder / "my data", "-o", "x", "--orbit", "3"}, 3,
+                "'raysplats train '" + (folder / "my data") + "' -o RUN'");
+}
+
 TEST_CASE("the kernel cache is cleared where it lies, and nothing else in it") {
   const TemporaryFolder cache;
   write_file(cache.path() / "raysplats" / "0123.bin", "program");
+  write_file(cache.path() / "raysplats" / ".0123.aB3xyZ", "half a program");
+  write_file(cache.path() / "raysplats" / ".lock", "");
   write_file(cache.path() / "raysplats" / "notes.txt", "mine");
   const Outcome outcome = raysplats_program({"devices", "--clear-cache"},
                                             {{{"XDG_CACHE_HOME", cache.path().string()}}});
   CHECK(outcome.code == 0);
   CHECK(contains(outcome.out, "1 compiled"));
-  CHECK(entries(cache.path() / "raysplats") == 1);
+  CHECK(entries(cache.path() / "raysplats") == 2);
 }
 
 TEST_CASE("no OpenCL platform is exit code 4 with the remedy") {

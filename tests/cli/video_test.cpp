@@ -114,8 +114,10 @@ TEST_CASE("the real ffmpeg writes every frame, where it is installed") {
 
 TEST_CASE("Ctrl-C ends a video as it ends files, also while ffmpeg takes its time") {
   const TemporaryFolder folder;
-  Surroundings around = with_ffmpeg(folder, "trap 'exit 255' INT\n: > '" + (folder / "begun") +
-                                                "'\nsleep 2 & wait\ncat > \"$word\"\n");
+  // As ffmpeg does it: signals do not end what waits for more.
+  Surroundings around =
+      with_ffmpeg(folder, "trap 'exit 255' INT\ntrap : TERM\n: > '" + (folder / "begun") +
+                              "'\nsleep 2 & wait\ncat > \"$word\"\n");
   around.launcher = {"/usr/bin/setsid"};  // a group of processes, as a terminal makes one
   const std::string model = folder / "balls.ply";
   write_file(model, ply_file(3));
@@ -132,6 +134,8 @@ TEST_CASE("Ctrl-C ends a video as it ends files, also while ffmpeg takes its tim
   INFO(outcome.err);
   CHECK(outcome.code == 130);
   CHECK(!fs::exists(folder / "out.mp4"));
+  for (const auto& entry : fs::directory_iterator(fs::path(folder / "")))
+    CHECK(entry.path().extension() != ".mp4");
 }
 
 TEST_CASE("what ffmpeg says when it fails is told, and no file is left") {

@@ -20,8 +20,8 @@ def test_a_ply_comes_back_as_it_was(tmp_path, arrays):
     read = rs.TraceOptions.load(tmp_path / "model.ply")
     assert (read.hit_order, read.quantile, tuple(read.background)) == ("peak", 9.0, (0.25, 0.5, 1.0))
     g.save(tmp_path / "plain.ply", origin=(1e6, 0, -2.5))
-    assert rs.Gaussians.load_origin(tmp_path / "plain.ply") == [1e6, 0, -2.5]
-    assert rs.Gaussians.load_origin(tmp_path / "model.ply") == [0, 0, 0]
+    assert rs.Gaussians.load_origin(tmp_path / "plain.ply") == (1e6, 0, -2.5)
+    assert rs.Gaussians.load_origin(tmp_path / "model.ply") == (0, 0, 0)
     assert rs.TraceOptions.load(tmp_path / "plain.ply") is None
 
 

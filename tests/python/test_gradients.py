@@ -47,6 +47,23 @@ def assert_close(name, found, expected):
     assert np.abs(found - expected).max() <= TOLERANCE * scale, name
 
 
+def test_ends_of_rays(context, arrays):
+    tracer, model = rs.Tracer(context), rs.Model(context, as_gaussians(arrays))
+    origins, directions = (each.astype(np.float32) for each in rays(9, seed=5))
+
+    def seen(**ends):
+        return tracer.trace(model, origins, directions, **ends).color
+
+    begin, end = (np.full(9, each, np.float32) for each in (1, 2))
+    expected = seen(t_min=begin, t_max=end)
+    assert not np.array_equal(expected, seen())
+    for kind in (int, float, np.float32, np.float64, np.int64, np.array):
+        assert np.array_equal(seen(t_min=kind(1), t_max=kind(2)), expected), kind
+    for wrong in ([2] * 9, "2", None, end.astype(float)):
+        with pytest.raises(TypeError, match="t_max"):
+            seen(t_max=wrong)
+
+
 @pytest.mark.parametrize("hit_order", ["entry", "peak"])
 @pytest.mark.parametrize("color_direction", ["ray", "from-origin"])
 def test_rays(context, hit_order, color_direction):

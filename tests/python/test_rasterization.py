@@ -50,6 +50,8 @@ def test_rasterization_gives_what_the_tracer_gives(context):
         picture = rs.Tracer(context, options).render(model, camera)
         assert np.abs(colors[i].detach().numpy() - picture.color).max() < 1e-5
         assert np.abs(alphas[i, ..., 0].detach().numpy() - picture.alpha).max() < 1e-5
+    sky = rs.TraceOptions(hit_order="peak", adaptive_radius=True, sky=[(0.5, 0.5, 0.5)], background=(0, 1, 0))
+    assert torch.equal(rt.rasterization(**scene, backgrounds=backgrounds, options=sky)[0], colors)
     colors.square().sum().backward()
     for name in ("means", "quats", "scales", "opacities", "colors", "viewmats"):
         assert scene[name].grad.abs().max() > 0, name

@@ -241,6 +241,24 @@ def test_wrong_tensors_are_refused_in_one_sentence(renderer):
         renderer.render(camera, **{**single, "means": single["means"][:6]})
 
 
+def test_poses_beside_a_sky_or_mirrors_have_no_gradients(context):
+    corners = torch.tensor([[-9.0, -9, 3], [9, -9, 3], [9, 9, 3]]).numpy()
+    square = rs.Mesh(corners, np.uint32([[0, 1, 2]]))
+    mirrors = rs.Mirrors(meshes=[square], materials=[rs.Material(kind="mirror")])
+    single, _ = leaves(random_arrays())
+    camera, viewmat = rs.Camera(4, 4, 4.0), torch.eye(4)
+    viewmat[2, 3] = 3
+    for made, what in (({"options": rs.TraceOptions(sky=[(0.1, 0.2, 0.3)])}, "a sky"), ({"mirrors": mirrors}, "mirrors")):
+        renderer = rt.Renderer(context, **made)
+        renderer.render(camera, **single, viewmat=viewmat).rgba.sum().backward()
+        assert torch.isfinite(single["means"].grad).all()
+        moved = viewmat.clone().requires_grad_()
+        with torch.no_grad():
+            assert renderer.render(camera, **single, viewmat=moved).rgba.any()
+        with pytest.raises(rs.UsageError, match=f"those of a pose are not known beside {what}: call detach"):
+            renderer.render(camera, **single, viewmat=moved)
+
+
 def test_a_renderer_refuses_in_one_sentence():
     for wrong, sentence in (
         ({"context": 2.5}, "context has to be a Context or a device, not float"),

@@ -123,11 +123,39 @@ def test_options():
     assert given.text("background") == '"0.5,0,1"'
     given["ssim-weight"] = 0.5
     assert "ssim-weight = 0.5" in given.to_toml()
+    for true in (True, np.bool_(True), np.array(True), "true"):
+        assert rs.TrainOptions(exposure=true).text("exposure") == "true"
+    with pytest.raises(rs.UsageError):
+        rs.TrainOptions(exposure="True")
+    numbers = rs.TrainOptions(iterations=np.int64(9), ssim_weight=np.float64(0.25), exposure=np.bool_(False))
+    assert [numbers.text(key) for key in ("iterations", "ssim-weight", "exposure")] == ["9", "0.25", "false"]
     assert {"iterations", "position-lr"} <= {*rs.TrainOptions.keys()}
     with pytest.raises(rs.UsageError, match="did you mean 'iterations'"):
         rs.TrainOptions(iteration=7)
     with pytest.raises(rs.UsageError, match="'sh-degree' needs a whole number from 0 to 4"):
         rs.TrainOptions(sh_degree=7)
+
+
+@pytest.mark.parametrize("end", ["", "raise SystemExit(0)", "del trainer"])
+def test_the_program_ends_while_photos_are_read(folder, tmp_path, end):
+    program = f"""
+        import time
+        import raysplats as rs
+        from raysplats import _images
+        def read(*source):
+            time.sleep(0.2)
+            return _images.read(*source)
+        rs.set_image_functions(read, _images.encode)
+        options = rs.TrainOptions(
+            iterations=100, init="random", init_count=200, sh_degree=0, densify_until=0, resolution_schedule=[],
+            image_budget=1)
+        trainer = rs.Trainer(rs.Context(), rs.Dataset.load({str(folder)!r}), {str(tmp_path / "run")!r}, options)
+        trainer.step(2)
+        {end}
+    """
+    run = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(program)], capture_output=True, text=True, timeout=300)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
 
 
 @pytest.mark.parametrize("call", ["run(on_step=begun)", "step(100000, on_step=begun)"])

@@ -84,13 +84,14 @@ def test_a_browser_is_opened_and_what_is_gone_ends(context, monkeypatch):
     gc.collect()
     with pytest.raises(OSError):
         page.connect()
-    with pytest.raises(rs.Error):
-        rs.Viewer(context, rs.Model(context, ball((1, 1, 1))), host="nowhere", open=False)
+    for wrong in ({"host": "nowhere"}, {"max_size": 0}, {"cameras": [rs.Camera(4, 4, float("nan"))]}):
+        with pytest.raises(rs.Error):
+            rs.Viewer(context, rs.Model(context, ball((1, 1, 1))), open=False, **wrong)
 
 
 def test_ctrl_c_and_the_end_of_the_program_end_it():
     program = textwrap.dedent("""
-        import sys, numpy as np, raysplats as rs
+        import os, sys, numpy as np, raysplats as rs
         context = rs.Context()
         model = rs.Model(context, rs.Gaussians(
             np.zeros((1, 3), np.float32), np.ones((1, 4), np.float32), np.zeros((1, 3), np.float32),
@@ -99,10 +100,16 @@ def test_ctrl_c_and_the_end_of_the_program_end_it():
         print("ready", flush=True)
         if sys.argv[1] == "wait":
             viewer.wait()
+        if sys.argv[1] == "fork":
+            child = os.fork()
+            if child:
+                assert os.waitpid(child, 0)[1] == 0
     """)
     run = subprocess.Popen([sys.executable, "-c", program, "wait"], stdout=subprocess.PIPE,
                            stderr=subprocess.PIPE, text=True)
     assert run.stdout.readline() == "ready\n"
     run.send_signal(signal.SIGINT)
     assert "KeyboardInterrupt" in run.communicate(timeout=60)[1]
-    subprocess.run([sys.executable, "-c", program, "end"], check=True, timeout=120)
+    for end in ("end", "fork"):
+        run = subprocess.run([sys.executable, "-c", program, end], capture_output=True, text=True, timeout=120)
+        assert (run.returncode, run.stdout, run.stderr) == (0, "ready\n", "")

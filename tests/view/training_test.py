@@ -20,8 +20,8 @@ FOLDER = ""  # with the photos and the run that nobody watched
 ITERATIONS = 600
 
 
-def arguments(run):
-    return [os.path.join(FOLDER, "photos"), "-o", os.path.join(FOLDER, run), "-n", str(ITERATIONS),
+def arguments(run, photos="photos"):
+    return [os.path.join(FOLDER, photos), "-o", os.path.join(FOLDER, run), "-n", str(ITERATIONS),
             "--init-count", "300", "--max-gaussians", "900", "--sh-degree", "1", "--deterministic",
             "--checkpoint-every", "0", "--log-every", "1"]
 
@@ -65,9 +65,10 @@ class TrainingTest(unittest.TestCase):
         self.assertEqual(run.process.wait(timeout=120), 0)
 
     def test_watching_pausing_and_saving_change_nothing(self):
-        with Viewer(PROGRAM, [*arguments("watched"), "--view"], "train") as run, Channel(run) as channel:
+        with Viewer(PROGRAM, [*arguments("watched/", "photos/"), "--view"], "train") as run, Channel(run) as channel:
             state = json.loads(run.ask("/api/state", Cookie=run.cookie())[2])
             self.assertTrue(state["trains"])
+            self.assertEqual((state["name"], state["about"]), ("watched", "in training on 6 photos of photos"))
             self.assertEqual(len(state["cameras"]), 6)
             channel.send_json(type="share", share=0.9)
             seen = []

@@ -80,7 +80,8 @@ def _renderer(options, near_plane, depth):
     from .torch import Renderer
 
     chosen = rs.TraceOptions.peak_order() if options is None else copy.copy(options)
-    chosen.near_depth, chosen.depth, chosen.background = near_plane, depth, (0, 0, 0)
+    chosen.near_depth, chosen.depth = near_plane, depth
+    chosen.background, chosen.sky = (0, 0, 0), ()  # those of the call count
     key = str(chosen.__getstate__())
     with _renderers_lock:
         if key not in _renderers:

@@ -55,7 +55,7 @@ class Viewer:
         self._viewer.wait()
 
     def close(self) -> None:
-        """Ends it; a second time does nothing."""
+        """Ends it; a second time does nothing, and neither does it in a child by fork."""
         self._end()
 
     def __enter__(self) -> Viewer:

@@ -194,6 +194,7 @@ class Renderer:
         _require_kind("mirrors", mirrors, rs.Mirrors, type(None))
         self.context = _context(context)
         self.tracer = rs.Tracer(self.context, options, mirrors=mirrors)
+        self._mirrors = mirrors is not None and len(mirrors.meshes) > 0
         # What the device keeps, and the number of the pass that it is of, are used together by the thread that has
         # the lock of the context, as every call of the tracer does: a lock of our own beside it could be waited for
         # by a thread that has that one, such as a callback of a Trainer.
@@ -202,9 +203,12 @@ class Renderer:
 
     def render(self, camera, means, quaternions, log_scales, opacities, sh, *, viewmat=None):
         """A Rendering of what a raysplats.Camera sees; `viewmat`, a tensor (4, 4) from the world to the camera, takes
-        the place of the camera's pose and gets gradients (tangent to rigid motions)."""
+        the place of the camera's pose and gets gradients (tangent to rigid motions), but not beside a sky or mirrors,
+        where they are not known."""
         _require_kind("camera", camera, rs.Camera)
         graded = torch.is_grad_enabled()  # within apply() it never is
+        if graded and isinstance(viewmat, torch.Tensor) and viewmat.requires_grad:
+            self._require_known_pose_gradients()
         seen = _View.apply(self, camera, graded, viewmat, means, quaternions, log_scales, opacities, sh)
         return Rendering(seen, None, None, None) if isinstance(seen, torch.Tensor) else Rendering(*seen)
 
@@ -215,6 +219,14 @@ class Renderer:
         parameters = (means, quaternions, log_scales, opacities, sh)
         graded = torch.is_grad_enabled()
         return TracedRays(*_Rays.apply(self, color_direction, graded, origins, directions, *parameters))
+
+    def _require_known_pose_gradients(self):
+        what = "mirrors" if self._mirrors else "a sky" if self.tracer.options.sky else None
+        if what is not None:
+            raise rs.UsageError(
+                f"viewmat requires gradients, but those of a pose are not known beside {what}: call detach(), or leave "
+                f"out {what}"
+            )
 
     def _upload(self, parameters):
         self._ticket += 1  # at once: what the device had is gone, whether or not this pass succeeds

@@ -56,11 +56,34 @@ bool is_contiguous(const nb::ndarray<nb::ro>& array) {
   return ordered || empty;
 }
 
+[[noreturn]] void fail_not_contiguous(const char* name) {
+  throw UsageError(
+      fmt::format("{} is not C-contiguous: make it so, as by numpy.ascontiguousarray", name));
+}
+
+/// Throws for arrays of numpy that cannot be handed over: by a type or an order of bytes that
+/// others do not know, or because rows are no whole number of elements apart, as in packed records.
+void require_known_layout(const nb::object& given, const char* name, const std::string& wanted) {
+  const nb::object type = nb::getattr(given, "dtype", nb::none());
+  if (!nb::hasattr(type, "isnative")) return;
+  const bool native = nb::cast<bool>(type.attr("isnative"));
+  if (!native || !type.equal(nb::str(wanted.c_str()))) {
+    throw nb::type_error(fmt::format("{} is an array of {}{}, but {} is needed: convert it, as by "
+                                     "astype(numpy.{})",
+                                     name, nb::cast<std::string>(nb::str(type)),
+                                     native ? "" : ", whose bytes are in another order", wanted,
+                                     wanted)
+                             .c_str());
+  }
+  fail_not_contiguous(name);
+}
+
 template <class T>
 Numbers<T> checked(const nb::object& given, const char* name, const Shape& shape) {
   const std::string wanted = dtype_name(nb::dtype<T>());
   nb::ndarray<nb::ro> array;
   if (!nb::try_cast(given, array, false)) {
+    require_known_layout(given, name, wanted);
     const std::string type = nb::cast<std::string>(nb::str(given.type().attr("__name__")));
     throw nb::type_error(
         fmt::format("{} has to be an array of {} of the shape {}, as numpy's, not {}{}", name,
@@ -84,8 +107,7 @@ Numbers<T> checked(const nb::object& given, const char* name, const Shape& shape
                                  shape_text(shape)));
   }
   if (!is_contiguous(array)) {
-    throw UsageError(
-        fmt::format("{} is not C-contiguous: make it so, as by numpy.ascontiguousarray", name));
+    fail_not_contiguous(name);
   }
   const auto* data = static_cast<const T*>(array.data());
   const std::span<const T> values(data, array.size());
@@ -100,6 +122,16 @@ Numbers<float> numbers(const FloatArray& array, const char* name, const Shape& s
 
 Numbers<std::uint32_t> numbers(const IndexArray& array, const char* name, const Shape& shape) {
   return checked<std::uint32_t>(array.value, name, shape);
+}
+
+void require_own_view(nb::handle self, const char* name, nb::handle given) {
+  // Where the numbers are, their type, shape and strides.
+  constexpr const char* kPlace = "__array_interface__";
+  const nb::object place = nb::getattr(self.attr(name), kPlace, nb::none());
+  if (!place.is_none() && place.equal(nb::getattr(given, kPlace, nb::none()))) return;
+  throw nb::attribute_error(
+      fmt::format("{} cannot be replaced: write into it, as by {}[:] = values", name, name)
+          .c_str());
 }
 
 FloatView array_of(std::vector<float> values, std::initializer_list<std::size_t> shape) {

@@ -57,6 +57,14 @@ nb::ndarray<nb::numpy, T> view(nb::handle owner,
   return nb::ndarray<nb::numpy, T>(data, shape, owner, strides);
 }
 
+/// Throws AttributeError unless `given` is the array that `self` has as `name`.
+void require_own_view(nb::handle self, const char* name, nb::handle given);
+
+/// The setter of a view: `thing.name += 1` writes into it and then sets what is there already.
+inline auto set_view(const char* name) {
+  return [name](nb::handle self, nb::handle given) { require_own_view(self, name, given); };
+}
+
 /// An array that owns `values`.
 FloatView array_of(std::vector<float> values, std::initializer_list<std::size_t> shape);
 

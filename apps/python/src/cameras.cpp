@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
@@ -18,6 +17,7 @@
 #include "names.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/io.hpp"
+#include "tuples.hpp"
 
 namespace raysplats::python {
 namespace {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
@@ -21,9 +20,39 @@
 #include "names.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
+#include "tuples.hpp"
 
 namespace raysplats::python {
 namespace {
+
+/// The arguments of Dataset.load() in their order, as DatasetOptions.
+using OptionsState = std::tuple<double,
+                                int,
+                                bool,
+                                std::string,
+                                std::string,
+                                std::string,
+                                std::optional<std::array<double, 3>>>;
+
+DatasetOptions options_of(const OptionsState& state) {
+  const auto& [downscale, test_every, undistort, masks, alpha, borders, origin] = state;
+  DatasetOptions options;
+  options.downscale = downscale;
+  options.test_every = test_every;
+  options.undistort = undistort;
+  options.masks = value_of(kMaskUses, "masks", masks);
+  options.alpha = value_of(kAlphaUses, "alpha", alpha);
+  options.borders = value_of(kBorderUses, "borders", borders);
+  options.origin = origin;
+  return options;
+}
+
+std::optional<OptionsState> options_state(const Dataset& dataset) {
+  if (!dataset.read_as) return std::nullopt;
+  const DatasetOptions& o = *dataset.read_as;
+  return OptionsState(o.downscale, o.test_every, o.undistort, name_of(kMaskUses, o.masks),
+                      name_of(kAlphaUses, o.alpha), name_of(kBorderUses, o.borders), o.origin);
+}
 
 Dataset load(const std::filesystem::path& path,
              double downscale,
@@ -33,15 +62,8 @@ Dataset load(const std::filesystem::path& path,
              const std::string& alpha,
              const std::string& borders,
              const std::optional<std::array<double, 3>>& origin) {
-  DatasetOptions options;
-  options.downscale = downscale;
-  options.test_every = test_every;
-  options.undistort = undistort;
-  options.masks = value_of(kMaskUses, "masks", masks);
-  options.alpha = value_of(kAlphaUses, "alpha", alpha);
-  options.borders = value_of(kBorderUses, "borders", borders);
-  options.origin = origin;
-  return load_dataset(path, options);
+  return load_dataset(
+      path, options_of({downscale, test_every, undistort, masks, alpha, borders, origin}));
 }
 
 FloatView picture(const View& self) {
@@ -70,7 +92,8 @@ using DatasetState = std::tuple<std::string,
                                 FloatArray,
                                 bool,
                                 std::array<double, 3>,
-                                int>;
+                                int,
+                                std::optional<OptionsState>>;
 
 Border border_state(const View& view) {
   if (!view.border) return std::nullopt;
@@ -110,7 +133,7 @@ View view_of(const ViewState& state) {
 
 Dataset dataset_of(const DatasetState& state) {
   const auto& [kind, root, views, positions, colors, tracks, errors, alpha_is_background, origin,
-               test_every] = state;
+               test_every, read_as] = state;
   Dataset out;
   out.kind = value_of(kDatasetKinds, "kind", kind);
   out.root = root;
@@ -122,6 +145,7 @@ Dataset dataset_of(const DatasetState& state) {
   out.alpha_is_background = alpha_is_background;
   out.origin = origin;
   out.test_every = test_every;
+  if (read_as) out.read_as = options_of(*read_as);
   return out;
 }
 
@@ -194,20 +218,20 @@ void bind_datasets(nb::module_& module) {
             return self.indices(value_of(kSplits, "split", split));
           },
           nb::arg("split"), "Of the views of 'train', 'test' or 'all'.")
-      .def_prop_ro(
+      .def_prop_rw(
           "point_positions",
           [](Self self) {
             PointCloud& points = nb::cast<Dataset&>(self).points;
             return view(self, points.positions.data(), {points.size(), 3});
           },
-          "(N, 3), sparse points of the data set; a view.")
-      .def_prop_ro(
+          set_view("point_positions"), "(N, 3), sparse points of the data set; a view.")
+      .def_prop_rw(
           "point_colors",
           [](Self self) {
             PointCloud& points = nb::cast<Dataset&>(self).points;
             return view(self, points.colors.data(), {points.size(), 3});
           },
-          "(N, 3), in [0, 1]; a view.")
+          set_view("point_colors"), "(N, 3), in [0, 1]; a view.")
       .def("__getstate__",
            [](Self self) {
              auto& d = nb::cast<Dataset&>(self);
@@ -217,7 +241,7 @@ void bind_datasets(nb::module_& module) {
                  nb::object(self.attr("point_positions")), nb::object(self.attr("point_colors")),
                  view(self, points.track_lengths.data(), {points.track_lengths.size()}),
                  view(self, points.errors.data(), {points.errors.size()}), d.alpha_is_background,
-                 d.origin, d.test_every);
+                 d.origin, d.test_every, options_state(d));
            })
       .def(
           "__setstate__",

@@ -2,6 +2,7 @@
 // Types of raysplats/error.hpp as Python exceptions with the same sentences.
 #include <cstring>
 #include <new>
+#include <stdexcept>
 #include <string>
 
 #include "bindings.hpp"
@@ -58,14 +59,18 @@ void set_exception(PyObject* type, const char* text) {
   Py_DECREF(message);
 }
 
+constexpr const char* kNoMemory =
+    "The host has no memory left: use fewer Gaussians or smaller pictures";
+
 void translate(const std::exception_ptr& thrown, void*) {
   try {
     std::rethrow_exception(thrown);
   } catch (const Error& error) {
     set_exception(type_of(error.code()), error.what());
   } catch (const std::bad_alloc&) {
-    PyErr_SetString(types.resource,
-                    "The host has no memory left: use fewer Gaussians or smaller pictures");
+    PyErr_SetString(types.resource, kNoMemory);
+  } catch (const std::length_error&) {  // of containers that no memory could hold
+    PyErr_SetString(types.resource, kNoMemory);
   }
 }
 

@@ -2,7 +2,6 @@
 #include "gaussians.hpp"
 
 #include <fmt/format.h>
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
@@ -18,6 +17,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/model_changes.hpp"
+#include "tuples.hpp"
 
 namespace raysplats::python {
 namespace {
@@ -54,41 +54,42 @@ Gaussians zeros(std::int64_t count, int sh_degree) {
 }
 
 void bind_views(nb::class_<Gaussians>& type) {
-  type.def_prop_ro(
+  type.def_prop_rw(
           "means",
           [](Self self) {
             Gaussians& g = held(self);
             return view(self, g.means.data(), {g.size(), 3});
           },
-          "(N, 3), world units; a view.")
-      .def_prop_ro(
+          set_view("means"), "(N, 3), world units; a view.")
+      .def_prop_rw(
           "quaternions",
           [](Self self) {
             Gaussians& g = held(self);
             return view(self, g.quaternions.data(), {g.size(), 4});
           },
-          "(N, 4), real part first, normalised when used; a view.")
-      .def_prop_ro(
+          set_view("quaternions"), "(N, 4), real part first, normalised when used; a view.")
+      .def_prop_rw(
           "log_scales",
           [](Self self) {
             Gaussians& g = held(self);
             return view(self, g.log_scales.data(), {g.size(), 3});
           },
-          "(N, 3), natural logarithms of the standard deviations; a view.")
-      .def_prop_ro(
+          set_view("log_scales"), "(N, 3), natural logarithms of the standard deviations; a view.")
+      .def_prop_rw(
           "opacities",
           [](Self self) {
             Gaussians& g = held(self);
             return view(self, g.opacities.data(), {g.size()});
           },
-          "(N,), logits; a view.")
-      .def_prop_ro(
+          set_view("opacities"), "(N,), logits; a view.")
+      .def_prop_rw(
           "sh",
           [](Self self) {
             Gaussians& g = held(self);
             return view(self, g.sh.data(),
                         {g.size(), static_cast<std::size_t>(sh_coefficients(g.sh_degree)), 3});
           },
+          set_view("sh"),
           "(N, (sh_degree + 1)^2, 3), coefficients of spherical harmonics; a view.");
 }
 

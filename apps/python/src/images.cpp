@@ -6,12 +6,16 @@
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
+#include <pthread.h>
 
+#include <atomic>
+#include <chrono>
 #include <cstring>
 #include <limits>
 #include <memory>
 #include <span>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include "bindings.hpp"
@@ -20,17 +24,51 @@
 #include "io/image_limits.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "signals.hpp"
 
 namespace raysplats::python {
 namespace {
 
-/// The functions in use. They live as long as the process: pictures may be asked for by threads
-/// that outlive the interpreter's modules.
+/// The functions in use, until the interpreter ends.
 struct Functions {
   PyObject* read = nullptr;
   PyObject* encode = nullptr;
 };
 Functions functions;
+
+/// Threads of the library call the functions too, such as those that read photos ahead for a
+/// Trainer. Once the interpreter ends, Python stops any thread that wants its lock in the middle of
+/// C++, which aborts the process. So the end waits for calls under way, and there are none after.
+std::atomic<int> calls = 0;
+std::atomic<bool> ending = false;
+
+class Call {
+ public:
+  explicit Call(const std::string& image) {
+    ++calls;
+    if (!ending) return;
+    --calls;
+    throw UsageError(fmt::format(
+        "The image {} cannot be read or written: the program ends, and Python with it", image));
+  }
+  ~Call() { --calls; }
+  Call(const Call&) = delete;
+  Call& operator=(const Call&) = delete;
+};
+
+void end_calls() {
+  ending = true;
+  {
+    const nb::gil_scoped_release release;
+    while (calls > 0) {
+      heed_signals(0);
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+  }
+  // A function of the program holds its module, and so whatever that has.
+  Py_CLEAR(functions.read);
+  Py_CLEAR(functions.encode);
+}
 
 /// The sentence of a failure that Python reports; the interpreter's lock is held.
 std::string sentence(const nb::python_error& error) {
@@ -63,6 +101,7 @@ class PythonCodec : public io::ImageCodec {
         io::require_bearable_size(name, size->width, size->height);
       }
     }
+    const Call call(name);
     const nb::gil_scoped_acquire acquire;
     try {
       nb::object source = memory.empty() ? nb::object(nb::str(name.c_str()))
@@ -82,6 +121,7 @@ class PythonCodec : public io::ImageCodec {
   std::vector<unsigned char> encode(const std::filesystem::path& path,
                                     const Image& image,
                                     const io::ImageEncoding& encoding) const override {
+    const Call call(path.string());
     const nb::gil_scoped_acquire acquire;
     try {
       const nb::object bytes = nb::borrow(functions.encode)(
@@ -144,6 +184,9 @@ FloatView array_of(Image image) {
 }
 
 void bind_images(nb::module_& module) {
+  nb::module_::import_("atexit").attr("register")(nb::cpp_function(&end_calls));
+  // A child by fork does not have the threads that are in calls.
+  ::pthread_atfork(nullptr, nullptr, [] { calls = 0; });
   module.def(
       "set_image_functions", &set_functions, nb::arg("read"), nb::arg("encode"),
       "Functions that pictures are read and written by. read(source, format) takes a path or "

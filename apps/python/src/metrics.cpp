@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "eval/metrics.hpp"
 
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
@@ -18,6 +17,7 @@
 #include "pickling.hpp"
 #include "raysplats/evaluation.hpp"
 #include "signals.hpp"
+#include "tuples.hpp"
 
 namespace raysplats::python {
 namespace {

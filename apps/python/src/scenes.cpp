@@ -2,7 +2,6 @@
 #include "raysplats/scene.hpp"
 
 #include <fmt/format.h>
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
@@ -25,6 +24,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/mirrors.hpp"
 #include "run/model_source.hpp"
+#include "tuples.hpp"
 
 namespace raysplats::python {
 namespace {
@@ -74,24 +74,24 @@ void bind_mesh(nb::module_& module) {
           nb::arg("normals") = nb::none(), nb::arg("uvs") = nb::none(),
           "Copies positions (V, 3), triangles (T, 3) of indices, materials (T,), indices of the "
           "scene's, else all 0, normals (V, 3), else flat, and uvs (V, 2).")
-      .def_prop_ro(
+      .def_prop_rw(
           "positions",
           [held](Self self) {
             return view(self, held(self).positions.data(), {held(self).vertex_count(), 3});
           },
-          "(V, 3).")
-      .def_prop_ro(
+          set_view("positions"), "(V, 3).")
+      .def_prop_rw(
           "triangles",
           [held](Self self) {
             return view(self, held(self).triangles.data(), {held(self).triangle_count(), 3});
           },
-          "(T, 3).")
-      .def_prop_ro(
+          set_view("triangles"), "(T, 3).")
+      .def_prop_rw(
           "materials",
           [held](Self self) {
             return view(self, held(self).materials.data(), {held(self).materials.size()});
           },
-          "(T,), indices of the scene's materials.")
+          set_view("materials"), "(T,), indices of the scene's materials.")
       .def("__getstate__",
            [held](Self self) {
              Mesh& mesh = held(self);
@@ -162,8 +162,10 @@ void bind_environment(nb::module_& module) {
           },
           nb::for_getter(nb::rv_policy::move), nb::for_setter(nb::arg("value").none()),
           "(height, width, 3), 360 degrees across; None = constant. Reading copies.")
-      .def_rw("sky", &Environment::sky,
-              "As TraceOptions.sky, seen where there is no picture, times `color`.")
+      .def_prop_rw(
+          "sky", [](const Environment& e) { return tuple_of(e.sky); },
+          [](Environment& e, const SkyLight& sky) { e.sky = sky; },
+          "As TraceOptions.sky, seen where there is no picture, times `color`.")
       .def_rw("up", &Environment::up)
       .def_rw("rotation", &Environment::rotation, "Degrees about `up`.");
 }
@@ -204,16 +206,18 @@ void set_textures(Scene& scene, const std::vector<FloatArray>& pictures) {
 }
 
 void bind_scene(nb::module_& module) {
-  nb::class_<Scene> type(module, "Scene",
-                         "Gaussians, meshes, materials, lights and an environment for PathTracer. "
-                         "Lists are read and set as a whole: what is read is a copy.");
+  nb::class_<Scene> type(
+      module, "Scene",
+      "Gaussians, meshes, materials, lights and an environment for PathTracer. "
+      "Gaussians and lists are read and set as a whole: what is read is a copy.");
   def_keywords(type, "Scene");
-  type.def_rw("gaussians", &Scene::gaussians)
-      .def_rw("meshes", &Scene::meshes)
-      .def_rw("materials", &Scene::materials)
+  // References would dangle once the attribute is set again.
+  type.def_rw("gaussians", &Scene::gaussians, nb::for_getter(nb::rv_policy::copy))
+      .def_rw("meshes", &Scene::meshes, nb::for_getter(nb::rv_policy::copy))
+      .def_rw("materials", &Scene::materials, nb::for_getter(nb::rv_policy::copy))
       .def_prop_rw("textures", &textures, &set_textures, nb::for_getter(nb::rv_policy::move),
                    "Arrays (height, width, 3).")
-      .def_rw("lights", &Scene::lights)
+      .def_rw("lights", &Scene::lights, nb::for_getter(nb::rv_policy::copy))
       .def_rw("environment", &Scene::environment)
       .def_rw("render", &Scene::render)
       .def_rw("trace", &Scene::trace);
@@ -223,10 +227,10 @@ void bind_mirrors(nb::module_& module) {
   nb::class_<Mirrors> type(
       module, "Mirrors",
       "Known mirrors for Tracer; every surface reflects from both sides, times "
-      "the colour of its material.");
+      "the colour of its material. Lists are read and set as a whole, as those of Scene.");
   def_keywords(type, "Mirrors");
-  type.def_rw("meshes", &Mirrors::meshes)
-      .def_rw("materials", &Mirrors::materials)
+  type.def_rw("meshes", &Mirrors::meshes, nb::for_getter(nb::rv_policy::copy))
+      .def_rw("materials", &Mirrors::materials, nb::for_getter(nb::rv_policy::copy))
       .def_rw("max_bounces", &Mirrors::max_bounces, "Mirrors that a ray may meet.");
 }
 

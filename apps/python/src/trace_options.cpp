@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
@@ -10,6 +9,7 @@
 #include "names.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/trace_options.hpp"
+#include "tuples.hpp"
 
 namespace raysplats::python {
 namespace {
@@ -68,10 +68,11 @@ void bind_trace_options(nb::module_& module) {
       .def_rw("near_depth", &TraceOptions::near_depth,
               "Gaussians nearer along the viewing axis are skipped; 0 = off.")
       .def_rw("background", &TraceOptions::background, "Colour behind everything.")
-      .def_rw(
-          "sky", &TraceOptions::sky,
+      .def_prop_rw(
+          "sky", [](const TraceOptions& o) { return tuple_of(o.sky); },
+          [](TraceOptions& o, const SkyLight& sky) { o.sky = sky; },
           "Behind everything in pictures, in place of `background`: 1, 4, 9, 16 or 25 (r, g, b) "
-          "of spherical harmonics, world axes, plus 0.5; [] = none.")
+          "of spherical harmonics, world axes, plus 0.5; () = none.")
       .def_rw("depth", &TraceOptions::depth, "Pictures have depths and numbers of hits too.")
       .def_rw("packet_width", &TraceOptions::packet_width,
               "Rays of a packet; 0 = the device's own.")

@@ -2,7 +2,6 @@
 #include "raysplats/tracer.hpp"
 
 #include <fmt/format.h>
-#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/variant.h>
@@ -25,6 +24,7 @@
 #include "raysplats/contributions.hpp"
 #include "raysplats/error.hpp"
 #include "signals.hpp"
+#include "tuples.hpp"
 
 namespace raysplats::python {
 namespace {
@@ -88,12 +88,18 @@ ViewGradients backward(HeldTracer& self, HeldModel& model, const FloatArray& gra
   return tracer.backward(gaussians, image);
 }
 
-/// One number for all rays, or one for each.
+/// One number for all rays, or one for each. The second takes numbers of other types too, such as
+/// numpy's and arrays without axes.
 using Bounds = std::variant<float, FloatArray>;
 
 std::vector<float> bounds_of(const Bounds& given, const char* name, std::size_t count) {
   if (const auto* all = std::get_if<float>(&given)) return std::vector<float>(count, *all);
-  return numbers(std::get<FloatArray>(given), name, {static_cast<std::ptrdiff_t>(count)}).copy();
+  const FloatArray& each = std::get<FloatArray>(given);
+  const nb::object axes = nb::getattr(each.value, "ndim", nb::int_(0));
+  if (PyNumber_Check(each.value.ptr()) != 0 && axes.equal(nb::int_(0))) {
+    return std::vector<float>(count, static_cast<float>(nb::cast<double>(nb::float_(each.value))));
+  }
+  return numbers(each, name, {static_cast<std::ptrdiff_t>(count)}).copy();
 }
 
 std::vector<Ray> rays_of(const FloatArray& origins,
@@ -130,7 +136,7 @@ TracedRays trace(HeldTracer& self,
   Tracer& tracer = *self;
   const Model& gaussians = *model;
   const nb::gil_scoped_release release;
-  return {tracer.trace(gaussians, rays, direction, differentiable)};
+  return {tracer.trace(gaussians, rays, direction, differentiable, &heed_signals)};
 }
 
 FloatView normals(HeldTracer& self, HeldModel& model, const Camera& camera) {
@@ -162,7 +168,7 @@ RaysGradients backward_rays(HeldTracer& self,
   Tracer& tracer = *self;
   const Model& gaussians = *model;
   const nb::gil_scoped_release release;
-  return tracer.backward(gaussians, gradients);
+  return tracer.backward(gaussians, gradients, &heed_signals);
 }
 
 /// A member of every record, as a strided view; `width` 0: a number each.
@@ -181,23 +187,25 @@ void bind_picture(nb::module_& module) {
   using Self = nb::handle_t<Picture>;
   const auto image = [](nb::handle self) -> Image& { return nb::cast<Picture&>(self).rgba; };
   nb::class_<Picture>(module, "Picture", "What a camera sees. The arrays are views.")
-      .def_prop_ro(
+      .def_prop_rw(
           "rgba", [image](Self self) { return channels(self, image(self), 0, 4); },
+          set_view("rgba"),
           "(height, width, 4): colour with the background blended in, alpha = 1 - transmittance.")
-      .def_prop_ro(
+      .def_prop_rw(
           "color", [image](Self self) { return channels(self, image(self), 0, 3); },
-          "(height, width, 3).")
-      .def_prop_ro(
+          set_view("color"), "(height, width, 3).")
+      .def_prop_rw(
           "alpha", [image](Self self) { return channels(self, image(self), 3, 0); },
-          "(height, width).")
-      .def_prop_ro(
+          set_view("alpha"), "(height, width).")
+      .def_prop_rw(
           "expected_depth", [](Self self) { return depth_channel(self, 0); },
+          set_view("expected_depth"),
           "(height, width), with TraceOptions.depth; 0 where nothing is.")
-      .def_prop_ro(
+      .def_prop_rw(
           "median_depth", [](Self self) { return depth_channel(self, 1); },
-          "(height, width), with TraceOptions.depth; 0 where nothing is.")
-      .def_prop_ro(
-          "hits", [](Self self) { return depth_channel(self, 2); },
+          set_view("median_depth"), "(height, width), with TraceOptions.depth; 0 where nothing is.")
+      .def_prop_rw(
+          "hits", [](Self self) { return depth_channel(self, 2); }, set_view("hits"),
           "(height, width), blended Gaussians, with TraceOptions.depth.")
       .def_ro("capped_rays", &Picture::capped_rays, "Rays that TraceOptions.max_hits stopped.");
 }
@@ -208,38 +216,38 @@ void bind_rays(nb::module_& module) {
     return nb::cast<TracedRays&>(self).results;
   };
   nb::class_<TracedRays>(module, "TracedRays", "What N rays met. The arrays are views.")
-      .def_prop_ro(
+      .def_prop_rw(
           "color",
           [all](Self self) { return column<float>(self, all(self), all(self).data()->color, 3); },
-          "(N, 3), background blended in.")
-      .def_prop_ro(
+          set_view("color"), "(N, 3), background blended in.")
+      .def_prop_rw(
           "alpha",
           [all](Self self) { return column<float>(self, all(self), &all(self).data()->alpha, 0); },
-          "(N,), 1 - transmittance.")
-      .def_prop_ro(
+          set_view("alpha"), "(N,), 1 - transmittance.")
+      .def_prop_rw(
           "expected_depth",
           [all](Self self) {
             return column<float>(self, all(self), &all(self).data()->expected_depth, 0);
           },
-          "(N,), mean depth of the hits in lengths of the direction.")
-      .def_prop_ro(
+          set_view("expected_depth"), "(N,), mean depth of the hits in lengths of the direction.")
+      .def_prop_rw(
           "median_depth",
           [all](Self self) {
             return column<float>(self, all(self), &all(self).data()->median_depth, 0);
           },
-          "(N,), where less than half of the light is left; 0 = nowhere.")
-      .def_prop_ro(
+          set_view("median_depth"), "(N,), where less than half of the light is left; 0 = nowhere.")
+      .def_prop_rw(
           "hits",
           [all](Self self) {
             return column<std::uint32_t>(self, all(self), &all(self).data()->hits, 0);
           },
-          "(N,), blended Gaussians.")
-      .def_prop_ro(
+          set_view("hits"), "(N,), blended Gaussians.")
+      .def_prop_rw(
           "capped",
           [all](Self self) {
             return column<std::uint32_t>(self, all(self), &all(self).data()->capped, 0);
           },
-          "(N,), 1 where TraceOptions.max_hits stopped the ray.")
+          set_view("capped"), "(N,), 1 where TraceOptions.max_hits stopped the ray.")
       .def("__len__", [](const TracedRays& self) { return self.results.size(); });
 }
 
@@ -248,17 +256,19 @@ void bind_gradients(nb::module_& module) {
   nb::class_<ViewGradients>(module, "ViewGradients", "Gradients of a loss over a picture.")
       .def_ro("parameters", &ViewGradients::parameters,
               "Of the Gaussians, shaped as they are and before activation.")
-      .def_prop_ro(
+      .def_prop_rw(
           "camera_center",
           [](View self) {
             return view(self, nb::cast<ViewGradients&>(self).pose.center.data(), {3});
           },
+          set_view("camera_center"),
           "(3,), for moving the camera's centre along the axes of the world.")
-      .def_prop_ro(
+      .def_prop_rw(
           "camera_rotation",
           [](View self) {
             return view(self, nb::cast<ViewGradients&>(self).pose.rotation.data(), {3});
           },
+          set_view("camera_rotation"),
           "(3,), for a small turn w about the centre in camera axes and radians: rotation := "
           "exp([w]x) rotation, the centre stays; NaN with mirrors and with a sky.")
       .def_ro("sky", &ViewGradients::sky, "Of TraceOptions.sky; [] without one.");
@@ -268,18 +278,18 @@ void bind_gradients(nb::module_& module) {
   };
   nb::class_<RaysGradients>(module, "RaysGradients", "Gradients of a loss over rays.")
       .def_ro("parameters", &RaysGradients::parameters, "As in ViewGradients.")
-      .def_prop_ro(
+      .def_prop_rw(
           "origins",
           [by_ray](Rays self) {
             return column<float>(self, by_ray(self), by_ray(self).data()->origin, 3);
           },
-          "(N, 3).")
-      .def_prop_ro(
+          set_view("origins"), "(N, 3).")
+      .def_prop_rw(
           "directions",
           [by_ray](Rays self) {
             return column<float>(self, by_ray(self), by_ray(self).data()->direction, 3);
           },
-          "(N, 3), for directions as they were given, of any length.");
+          set_view("directions"), "(N, 3), for directions as they were given, of any length.");
 }
 
 }  // namespace
@@ -323,7 +333,9 @@ void bind_tracer(nb::module_& module) {
           },
           nb::arg("color"), nb::arg("sky") = SkyLight(), nb::call_guard<nb::gil_scoped_release>(),
           "Colour behind everything from the next call on, or TraceOptions.sky in its place.")
-      .def_prop_ro("options", [](HeldTracer& self) { return self->options(); });
+      .def_prop_ro(
+          "options", [](HeldTracer& self) { return self->options(); },
+          "A copy: a Tracer keeps those that it was made with, but for set_background().");
   module.def(
       "contributions",
       [](HeldContext& context, const Gaussians& gaussians, const std::vector<Camera>& cameras,
@@ -332,7 +344,7 @@ void bind_tracer(nb::module_& module) {
         {
           const nb::gil_scoped_release others;
           found = contributions(*context, gaussians, cameras, options.value_or(TraceOptions{}),
-                                mirrors.value_or(Mirrors{}));
+                                mirrors.value_or(Mirrors{}), &heed_signals);
         }
         const std::size_t count = found.size();
         return array_of(std::vector<float>(found.begin(), found.end()), {count});

@@ -38,9 +38,10 @@ class HeldTrainer : public Held<Trainer> {
 
 /// A value of Python as the words that configuration files have.
 std::string word(nb::handle value) {
-  if (value.is(Py_True)) return "true";
-  if (value.is(Py_False)) return "false";
-  return nb::cast<std::string>(nb::str(value));
+  auto text = nb::cast<std::string>(nb::str(value));
+  if (nb::isinstance<nb::str>(value)) return text;
+  // So Python and numpy call theirs.
+  return text == "True" ? "true" : text == "False" ? "false" : text;
 }
 
 std::vector<std::string> words(nb::handle value) {

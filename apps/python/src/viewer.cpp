@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <nanobind/stl/array.h>
+#include <fmt/format.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -12,8 +12,11 @@
 #include "bindings.hpp"
 #include "context.hpp"
 #include "raysplats/camera.hpp"
+#include "raysplats/error.hpp"
 #include "raysplats/trace_options.hpp"
+#include "scene/camera_check.hpp"
 #include "signals.hpp"
+#include "tuples.hpp"
 #include "view/model_viewer.hpp"
 
 namespace raysplats::python {
@@ -22,6 +25,10 @@ namespace {
 namespace nb = nanobind;
 
 using HeldViewer = Held<view::ModelViewer>;
+
+// As of `raysplats view --max-size`.
+constexpr int kLeastSide = 64;
+constexpr int kMostSide = 8192;
 
 void make(HeldViewer* self,
           HeldContext& context,
@@ -36,7 +43,11 @@ void make(HeldViewer* self,
   view::ViewerOptions viewer;
   viewer.server.host = host;
   viewer.server.port = port;
+  if (max_size < kLeastSide || max_size > kMostSide) {
+    throw UsageError(fmt::format("max_size is {} to {}, not {}", kLeastSide, kMostSide, max_size));
+  }
   viewer.max_side = max_size;
+  for (const Camera& each : cameras) require_pixels(each);
   new (self) HeldViewer(*context, *model, options, cameras, name, viewer, origin);
 }
 
@@ -61,7 +72,11 @@ void bind_viewer(nb::module_& module) {
       .def_prop_ro("url", [](HeldViewer& self) { return self->url(); })
       .def("wait", &wait)
       .def(
-          "close", [](HeldViewer& self) { self->close(); }, Guard());
+          "close",
+          [](HeldViewer& self) {
+            if (!is_forked()) self->close();
+          },
+          Guard());
 }
 
 }  // namespace raysplats::python

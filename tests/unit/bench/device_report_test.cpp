@@ -5,12 +5,14 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "bench/cards.hpp"
 #include "bench/kernel_folders.hpp"
@@ -113,6 +115,16 @@ TEST_CASE("rows that yield more than two folders of kernels are compared by are 
   CHECK(contains(kernel_comparison_table(same),
                  "what these rows yield besides is not compared, but by the tests: loss-value, "
                  "densify, rays\n"));
+}
+
+TEST_CASE("what is no number in a result of two folders of kernels stays the largest difference") {
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<float> before{1, 2, 4}, after{1, kNone, 5};
+  const ResultDifference difference = difference_of("image", before, after);
+  CHECK(difference.differing == 2);
+  CHECK(std::isnan(difference.largest));
+  const std::vector<float> others{1, 2.5f, 5};
+  CHECK(difference_of("image", before, others).largest == 0.25);
 }
 
 TEST_CASE("two folders of kernels are compared by what they compute, then by time in turns") {

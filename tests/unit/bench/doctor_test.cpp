@@ -51,6 +51,14 @@ TEST_CASE("a device that cannot be opened is a verdict, not an end") {
   CHECK(contains(diagnosis.advice.back(), "pocl-opencl-icd"));
 }
 
+TEST_CASE("what drivers say in no known characters does not keep a diagnosis from being written") {
+  Diagnosis diagnosis;
+  diagnosis.devices.push_back({});
+  diagnosis.devices[0].device.name = "card \xae";
+  const nlohmann::json json = nlohmann::json::parse(diagnosis_json(diagnosis));
+  CHECK(json.at("devices").at(0).at("device").at("name") == "card \ufffd");
+}
+
 TEST_CASE("a driver that fails by its surroundings is not to be updated") {
   Diagnosis diagnosis;
   diagnosis.devices = {sound_device(DeviceType::kCpu, "Intel")};

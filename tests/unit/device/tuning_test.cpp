@@ -6,6 +6,7 @@
 #include <string>
 
 #include "device/context.hpp"
+#include "device/device_json.hpp"
 #include "raysplats/error.hpp"
 #include "unit/fixture.hpp"
 #include "unit/log_capture.hpp"
@@ -63,6 +64,16 @@ TEST_CASE("tuning: stored per device, driver and version, and found again") {
   CHECK_FALSE(TuningStore(directory).find(device("A")));
   CHECK(TuningStore(directory).remove(device("A")) == 0);
   CHECK(TuningStore(directory).remove(device("B")) == 1);
+}
+
+TEST_CASE("tuning: a device whose name is no text is found again, and its JSON can be written") {
+  const TemporaryDirectory folder;
+  DeviceInfo odd = device("card \xae");
+  odd.driver_version = "\xff 1";
+  TuningStore(folder.path().string()).store(odd, kTuning);
+  odd.tuning = TuningStore(folder.path().string()).find(odd);
+  REQUIRE(odd.tuning == kTuning);
+  CHECK(device_json(odd).at("tuning").at("bvh") == true);
 }
 
 TEST_CASE("tuning: a broken file is ignored with one line, and replaced") {

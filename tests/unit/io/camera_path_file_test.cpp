@@ -229,7 +229,17 @@ seconds = 0.5
   CHECK(refusal(folder.write("b.toml", "[[key]]\neye = [0, 0, 1]\n")).find("target") !=
         std::string::npos);
   CHECK(refusal(folder.write("c.toml", "[[key]]\neye = [0, 1, 0]\ntarget = [0, 0, 0]\n"))
-            .find("up") != std::string::npos);
+            .find("c.toml, line 1: 'up' in [[key]] is along the view") != std::string::npos);
+  CHECK(refusal(folder.write("b.toml", "[[key]]\ntarget = [0, 0, 1]\n"))
+            .find("line 1: 'eye' in [[key]] is missing") != std::string::npos);
+  CHECK(refusal(folder.write("e.toml", "[[key]]\neye = [0, 0, 1]\ntarget = [0, 0, 1]\n"))
+            .find("'eye' and 'target' in [[key]] are the same point") != std::string::npos);
+  // However near the target is.
+  const auto tiny =
+      folder.write("f.toml", "fps = 1\n[[key]]\neye = [0, 0, 0]\ntarget = [0, 0, 1e-10]\n");
+  CHECK(read_camera_path(tiny, {}).cameras.size() == 1);
+  CHECK(refusal(folder.write("g.toml", "[[key]]\neye = [0, 1e9, 0]\ntarget = [0, 0, 0.1]\n"))
+            .find("along the view") != std::string::npos);
   CHECK(refusal(folder.write("d.toml", "fsp = 8\n")).find("fsp") != std::string::npos);
 }
 
@@ -252,6 +262,20 @@ TEST_CASE("what is no path is refused with one sentence") {
   CHECK(refused(key_file(mirrored, matrix_at(4))).find("reflection") != std::string::npos);
   mirrored[0] = 2;
   CHECK(refused(key_file(mirrored, matrix_at(4))).find("rigid") != std::string::npos);
+  // By columns, as three.js stores matrices.
+  const json transposed{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 4, 2, 3, 1};
+  const json text("[1, 0, 0, 4, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1]");
+  for (const json& matrix : {transposed, text})
+    CHECK(refused(key_file(matrix_at(0), matrix)).find("seems transposed") != std::string::npos);
+  json frames = key_file(matrix_at(0), matrix_at(4));
+  frames.erase("keyframes");
+  frames["camera_path"] = {{{"camera_to_world", transposed}, {"fov", 60}}};
+  CHECK(refused(frames).find("seems transposed") != std::string::npos);
+  json projective = matrix_at(0);
+  projective[14] = 0.5;
+  const std::string other = refused(key_file(projective, matrix_at(4)));
+  CHECK(other.find("last row") != std::string::npos);
+  CHECK(other.find("transposed") == std::string::npos);
   for (const auto& [key, value] : {std::pair<const char*, json>{"fps", 0},
                                    {"fps", "x"},
                                    {"seconds", -1},

@@ -297,9 +297,14 @@ TEST_CASE("folders of 3DGS's convert.py: the photos in input or in images that t
   // A model of the photos in input beside photos of another size.
   distorted.write_binary(scratch / "sparse/0");
   CHECK(folder_of() == "input");
-  // The same sizes in both: images, as ever.
+  // The same sizes in both: images, as ever, also where a photo was deleted from it.
   write_photos(distorted, scratch / "images", 40, 30);
   CHECK(folder_of() == "images");
+  fs::remove(scratch / "images" / distorted.images[2].name);
+  CHECK(folder_of() == "images");
+  CHECK(load_dataset(scratch.path()).views.size() == 5);
+  for (const int i : {0, 1, 3}) fs::remove(scratch / "images" / distorted.images[i].name);
+  CHECK(folder_of() == "input");
   fs::remove_all(scratch / "images");
   fs::remove_all(scratch / "images_2");
   CHECK(folder_of() == "input");
@@ -445,6 +450,37 @@ TEST_CASE("points of a COLMAP model may be a PLY where the model has no others")
   CHECK(log.contains("no points to start from"));
 }
 
+TEST_CASE("points of a COLMAP model that are not finite are left out, which is told") {
+  ColmapFixture fixture = small_colmap();
+  fixture.points[0].position[2] = std::numeric_limits<double>::quiet_NaN();
+  fixture.points[1].position[0] = 1e300;  // beyond a float
+  for (const bool binary : {true, false}) {
+    CAPTURE(binary);
+    const Scratch scratch;
+    binary ? fixture.write_binary(scratch / "sparse/0") : fixture.write_text(scratch / "sparse/0");
+    if (!binary) {
+      // Every image shows the points of its own track.
+      write_bytes(scratch / "sparse/0/points3D.txt",
+                  "1 nan 2 3 1 2 3 0.5 100 0 99 0\n2 1e300 2 3 1 2 3 0.5 100 1\n"
+                  "3 0.125 4 5 1 2 3 0.25 99 1 98 0 97 0\n");
+    }
+    write_photos(fixture, scratch / "images", 40, 30);
+    const LogCapture log;
+    const Dataset dataset = load_dataset(scratch.path());
+    CHECK(log.contains("2 of 3 points have a coordinate that is not finite and are left out"));
+    CHECK(dataset.points.positions == std::vector<float>{0.125f, 4, 5});
+    CHECK(dataset.points.colors.size() == 3);
+    CHECK(dataset.points.track_lengths == std::vector<std::uint32_t>{binary ? 2u : 3u});
+    CHECK(dataset.points.errors.size() == 1);
+    if (binary) continue;
+    const io::ColmapModel model = io::read_colmap_model(scratch / "sparse/0");
+    for (const io::ColmapImage& image : model.images) {
+      const bool shows = image.id >= 97 && image.id <= 99;
+      CHECK(image.points == std::vector<std::uint32_t>(shows ? 1 : 0, 0));
+    }
+  }
+}
+
 TEST_CASE("a data set without its photos, with foreign photos or without anything is refused") {
   const Scratch scratch;
   const ColmapFixture fixture = small_colmap();
@@ -501,6 +537,8 @@ TEST_CASE("malformed COLMAP models are refused with the place of the fault") {
   CHECK(contains(text_error_with("cameras.txt", fixture.cameras_text()), "'MEI' is not known"));
   CHECK(contains(text_error_with("cameras.txt", "7 PINHOLE 40 30 1 2 3\n"),
                  "parameter is missing in line 1"));
+  CHECK(contains(text_error_with("cameras.txt", "\n7 PINHOLE 40 30 1 2 3 4 4\n"),
+                 "PINHOLE has 4 parameters and '4' follows them in line 2"));
   CHECK(contains(text_error_with("cameras.txt", "7 PINHOLE -40 30 1 2 3 4\n"), "'-40'"));
   CHECK(contains(text_error_with("cameras.txt", "7 PINHOLE 40 30 1 nan 3 4\n"), "not finite"));
   fixture.cameras[1].parameters[0] = -1;
@@ -522,9 +560,6 @@ TEST_CASE("malformed COLMAP models are refused with the place of the fault") {
   fixture = small_colmap();
   fixture.images[2].name = fixture.images[1].name;
   CHECK(contains(error_with("images.bin", fixture.images_binary()), "appears twice"));
-  fixture = small_colmap();
-  fixture.points[1].position[2] = std::numeric_limits<double>::infinity();
-  CHECK(contains(error_with("points3D.bin", fixture.points_binary()), "not finite"));
   CHECK(contains(text_error_with("points3D.txt", "1 2 3\n"), "in line 1"));
   for (const char* file : {"cameras.bin", "images.bin", "points3D.bin"}) {
     CHECK(contains(error_with(file, std::string(8, '\xff')), "18446744073709551615"));

@@ -73,8 +73,16 @@ TEST_CASE("conversion turns what is up to -y, harmonics as well") {
   pointer.means = {0.3f, -0.4f, 0.5f};
   const double length = std::sqrt(0.5);
   CHECK(farthest(changed(pointer, changes).means, {0, static_cast<float>(-length), 0}) < 1e-6);
-  changes.up = glm::dvec3(0.0);
-  CHECK(contains(message_of<UsageError>([&] { changed(model, changes); }), "up 0,0,0"));
+  for (const double length : {1e-200, 1e200}) {
+    changes.up = glm::dvec3(0, 0, length);
+    CHECK(farthest(changed(model, changes).means, {0, -2, 0, 1, 0, 0}) < 1e-6);
+  }
+  const auto refused = [&](const glm::dvec3& up) {
+    changes.up = up;
+    return message_of<UsageError>([&] { changed(model, changes); });
+  };
+  CHECK(contains(refused(glm::dvec3(0.0)), "up 0,0,0 is no direction"));
+  CHECK(contains(refused({1, HUGE_VAL, 0}), "up 1,inf,0 is no direction"));
 }
 
 TEST_CASE("changes out of range are refused, and half a box is half of space") {
@@ -188,6 +196,12 @@ TEST_CASE("conversion scales the near depth that the header says as the model") 
   convert_model(scratch / "a.ply", scratch / "b.ply", changes, {},
                 read_ply_options(scratch / "a.ply"), false);
   CHECK(read_ply_options(scratch / "b.ply")->near_depth == 2.5f);
+  trace.near_depth = 1e10f;
+  changes.scale = 1e30;
+  CHECK(contains(message_of<UsageError>([&] {
+                   convert_model(scratch / "a.ply", scratch / "b.ply", changes, {}, trace, true);
+                 }),
+                 "near depth of"));
 }
 
 TEST_CASE("the origin of a model scales and turns with it") {
@@ -224,9 +238,75 @@ TEST_CASE("a translation that leads an origin back to 0 takes it away") {
   };
   CHECK(farthest(moved({-448260, -5411932, -300}), {2, 1, 2, 5, 4, 5}) == 0.0);
   CHECK(io::model_origin(scratch / "b.ply") == std::array<double, 3>{});
-  // Any other moves what counts from it.
-  CHECK(farthest(moved({10, 0, 0}), {10, 1, 2, 13, 4, 5}) == 0.0);
-  CHECK(io::model_origin(scratch / "b.ply") == std::array<double, 3>{448262, 5411932, 300});
+  // Any other moves it, and leaves the numbers alone.
+  CHECK(moved({10, 0, 0}) == model.means);
+  CHECK(io::model_origin(scratch / "b.ply") == std::array<double, 3>{448272, 5411932, 300});
+  // As far away on the other side as numbers would merge.
+  CHECK(moved({-400000, -5411932, -300}) == model.means);
+  CHECK(io::model_origin(scratch / "b.ply") == std::array<double, 3>{48262, 0, 0});
+}
+
+TEST_CASE("a model moved to the coordinates of a map and back is where it was") {
+  const Scratch scratch;
+  const Gaussians model = trained_like(300, 1);
+  write_model(scratch / "a.ply", model);
+  const auto moved = [&](const char* from, const char* to, const glm::dvec3& by) {
+    ModelChanges changes;
+    changes.translate = by;
+    return convert_model(scratch / from, scratch / to, changes, {}, std::nullopt, true).losses;
+  };
+  const glm::dvec3 place(500000, 4000000, 100);
+  CHECK(moved("a.ply", "far.ply", place) ==
+        "nothing is lost, positions count from 500000, 4000000, 100, as its header says, which "
+        "other programs pass over");
+  CHECK(moved("far.ply", "back.ply", -place) == "nothing is lost");
+  CHECK(farthest(read_model(scratch / "back.ply").means, model.means) < 1e-5);
+  CHECK(io::model_origin(scratch / "back.ply") == std::array<double, 3>{});
+  // Numbers that are as far away themselves are moved as any.
+  CHECK(moved("a.ply", "near.ply", {100, 0, 0}) == "nothing is lost");
+  CHECK(io::model_origin(scratch / "near.ply") == std::array<double, 3>{});
+  // Little blur is taken before an origin, and told.
+  CHECK(moved("a.ply", "near.ply", {40000, 0, 0}) ==
+        "32-bit numbers shift positions by 0.0024 that far away");
+  CHECK(io::model_origin(scratch / "near.ply") == std::array<double, 3>{});
+  CHECK(std::abs(read_model(scratch / "near.ply").means[0] - model.means[0] - 40000) < 0.01);
+  CHECK(contains(message_of<UsageError>([&] {
+                   moved("a.ply", "far.ply", {1e12, 0, 0});
+                 }),
+                 "would count from 1e+12, 0, 0"));
+  Gaussians blurred = model;
+  for (std::size_t i = 0; i < blurred.means.size(); i += 3) blurred.means[i] += 500000.0f;
+  write_model(scratch / "blurred.ply", blurred);
+  CHECK(moved("blurred.ply", "b.ply", {-500000, 0, 0}) == "nothing is lost");
+  CHECK(read_model(scratch / "b.ply").means[0] == blurred.means[0] - 500000.0f);
+  CHECK(moved("blurred.ply", "b.ply", {100, 0, 0}) == "nothing is lost");
+  CHECK(read_model(scratch / "b.ply").means[0] == blurred.means[0] + 100.0f);
+  // Formats without an origin: the loss is told.
+  const std::string told = moved("a.ply", "far.glb", place);
+  CHECK(told.starts_with("32-bit numbers shift positions by 0.24 that far away"));
+  CHECK(contains(moved("a.ply", "far.spz", place), ", 32-bit numbers shift positions by 0.24"));
+  for (const char* name : {"far.glb", "far.spz"}) {
+    const Gaussians far = read_model(scratch / name);
+    for (std::size_t i = 0; i < far.means.size(); ++i)
+      CHECK(std::abs(far.means[i] - model.means[i] - place[static_cast<int>(i % 3)]) < 1.0);
+  }
+  CHECK(contains(moved("far.ply", "far.glb", {1, 0, 0}),
+                 "no number of the Gaussians is changed, positions count from -500001, -4000000, "
+                 "100, which is not said in the file"));
+  CHECK(read_model(scratch / "far.glb").means == model.means);
+}
+
+TEST_CASE("conversion says the origin in the axes of the file that it writes") {
+  const Scratch scratch;
+  write_model(scratch / "a.ply", trained_like(3, 0), {}, std::nullopt, {448262, 0, 300});
+  const auto told = [&](const char* to, SpzAxes axes) {
+    ModelEncoding encoding;
+    encoding.spz_axes = axes;
+    return convert_model(scratch / "a.ply", scratch / to, {}, encoding, std::nullopt, true).losses;
+  };
+  CHECK(contains(told("b.glb", SpzAxes::kPly), "count from -448262, 0, 300, which is not said"));
+  CHECK(contains(told("b.spz", SpzAxes::kPly), "count from 448262, 0, 300, which is not said"));
+  CHECK(contains(told("b.spz", SpzAxes::kRub), "count from 448262, 0, -300, which is not said"));
 }
 
 TEST_CASE("opacities at the ends of a byte are whole ones in every format") {
@@ -284,6 +364,25 @@ TEST_CASE("losses are named for the model at hand") {
   CHECK(!contains(io::losses(io::ModelFormat::kSplat, flat), "SH"));
   CHECK(io::losses(io::ModelFormat::kGltf, trained_like(2, 3)) == "nothing is lost");
   CHECK(contains(io::losses(io::ModelFormat::kGltf, trained_like(2, 4)), "degree 3"));
+  const auto of_glb = [](float log_scale, float logit) {
+    const Scratch scratch;
+    Gaussians model = trained_like(2, 0);
+    model.log_scales[1] = log_scale;
+    model.opacities[1] = logit;
+    write_model(scratch / "a.glb", model);
+    const Gaussians again = read_model(scratch / "a.glb");
+    const std::string told = io::losses(io::ModelFormat::kGltf, model);
+    CHECK(contains(told, "scales beyond 1e-30 to 2.4e17 (1 of 2 Gaussians) are clamped") ==
+          (std::abs(again.log_scales[1] - log_scale) > 1e-3f));
+    CHECK(contains(told, "opacities within 1e-7 of 0 or 1 (1 of 2 Gaussians) are clamped") ==
+          (std::abs(again.opacities[1] - logit) > 0.2f));
+    CHECK((told == "nothing is lost") == !contains(told, "clamped"));
+    return told;
+  };
+  CHECK(of_glb(-69, 16) == "nothing is lost");
+  CHECK(of_glb(40, -16) == "nothing is lost");
+  CHECK(contains(of_glb(-70, 17), "opacities within"));
+  CHECK(contains(of_glb(41, -17), "scales beyond"));
   Gaussians needles = flat;
   needles.log_scales[0] = -14;
   CHECK(contains(io::losses(io::ModelFormat::kSpz, needles), "clamped"));

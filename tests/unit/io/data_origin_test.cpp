@@ -86,6 +86,14 @@ TEST_CASE("a scene far from the origin of its files is counted from where it is"
   }
 }
 
+TEST_CASE("an origin that is no place near cameras is refused") {
+  DatasetOptions options;
+  for (const double odd : {std::nan(""), 1e300, -2e9}) {
+    options.origin = {0, odd, 0};
+    CHECK_THROWS_AS(load_dataset("nowhere", options), UsageError);
+  }
+}
+
 TEST_CASE("cameras in one place without points count from 0 unless they are far away") {
   const glm::dvec3 place(3, -1, 2);
   std::vector<View> views(5);

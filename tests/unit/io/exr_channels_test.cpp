@@ -52,6 +52,7 @@ TEST_CASE("colours of an EXR are those without a layer, or of one layer by their
     CHECK(read({name}) == Numbers{1});
   }
   CHECK(read({"Y", "A"}) == Numbers{1, 2});
+  CHECK(read({"R", "A"}) == Numbers{1, 2});
 }
 
 TEST_CASE("an EXR without colours is refused by the names of its channels") {
@@ -60,10 +61,16 @@ TEST_CASE("an EXR without colours is refused by the names of its channels") {
     const fs::path path = write_channels(scratch / "a.exr", names);
     return data_error([&] { read_image(path); });
   };
-  CHECK(contains(refusal({"N.X", "N.Y", "N.Z"}), "a.exr has the channels N.X, N.Y, N.Z and none"));
+  CHECK(contains(refusal({"N.X", "N.Y", "N.Z"}),
+                 "a.exr has the channels N.X, N.Y, N.Z and no colours"));
+  // Neither colours as brightness and differences nor two of three are grey.
+  CHECK(contains(refusal({"Y", "RY", "BY"}), "channels BY, RY, Y and no colours"));
+  CHECK(contains(refusal({"R", "G"}), "channels G, R and no colours"));
+  CHECK(contains(refusal({"R", "B", "A"}), "channels A, B, R and no colours"));
+  CHECK(contains(refusal({"R", "G", "Y"}), "channels G, R, Y and no colours"));
   CHECK(contains(refusal({"a.R", "a.G", "b.B"}), "a.R, a.G, b.B") == false);  // in their order
-  CHECK(contains(refusal({"a.R", "a.G", "b.B"}), "channels a.G, a.R, b.B and none of colours"));
+  CHECK(contains(refusal({"a.R", "a.G", "b.B"}), "channels a.G, a.R, b.B and no colours"));
   Names many;
   for (int i = 0; i < 9; ++i) many.push_back("crypto.0" + std::to_string(i));
-  CHECK(contains(refusal(many), "crypto.07 and 1 more and none of colours"));
+  CHECK(contains(refusal(many), "crypto.07 and 1 more and no colours"));
 }

@@ -58,6 +58,31 @@ TEST_CASE("images are found where the marks of letters are characters of their o
   CHECK(found_among({"Bar.png", kDecomposed + ".png"}, kComposed + ".png") == kDecomposed + ".png");
 }
 
+TEST_CASE("a path through a link leads where the system follows it, with or without extension") {
+  const Scratch scratch;
+  for (const char* file : {"real/images/0.png", "real/images/1.JPG", "other/images/0.png",
+                           "other/images/1.jpg", "other/images/2.png", "real/scene/own.png"})
+    scratch.write(file, "");
+  fs::create_directory_symlink("../real/scene", scratch / "other/scene");
+  const auto found = [&](const char* path) {
+    const auto image = io::find_image(scratch / "other/scene", path);
+    return image ? fs::canonical(*image).lexically_relative(fs::canonical(scratch.path())).string()
+                 : "";
+  };
+  CHECK(found("../images/0.png") == "real/images/0.png");
+  CHECK(found("../images/0") == "real/images/0.png");
+  CHECK(found("../images/1") == "real/images/1.JPG");
+  CHECK(found("../images/1.jpg") == "real/images/1.JPG");
+  CHECK(found("../../real/images/0.png") == "real/images/0.png");
+  // What the system does not find is sought where the names alone lead.
+  CHECK(found("missing/../own.png") == "real/scene/own.png");
+  CHECK(found("../images/2.png").empty());
+  // One file has one spelling.
+  CHECK(io::find_image(scratch / "other/scene", ".././images/0.png") ==
+        io::find_image(scratch / "other/scene", "../images/0.png"));
+  CHECK(io::find_image(scratch / "real/scene", "../images/0.png") == scratch / "real/images/0.png");
+}
+
 TEST_CASE("of several images that differ in spelling alone none is found") {
   CHECK(found_among({"a.Jpg", "A.jpg"}, "a.jpg").empty());
   CHECK(found_among({"a.png", "A.jpg"}, "A").empty());

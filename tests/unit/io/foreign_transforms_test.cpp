@@ -110,8 +110,14 @@ TEST_CASE("numbers that were written as texts are numbers, other texts are none"
   CHECK(camera.width == 40);
   CHECK(camera.fx == 50);
   CHECK(camera.cx == -1.5);
+  // Numbers that are too small for a double are 0.
+  for (const char* text : {"1e-400", "-1e-400", "+0.001e-4000"}) {
+    CAPTURE(text);
+    const std::string keys = kKeys + fmt::format("\"cx\": \"{}\", ", text);
+    CHECK(cameras_of(file_of(keys, frame_with(matrix_json(1)))).front().cx == 0);
+  }
   CHECK(glm::length(camera.center() - glm::dvec3(7, 2, 3)) < 1e-12);
-  for (const char* text : {"50 px", "", "nan", "inf"}) {
+  for (const char* text : {"50 px", "", "nan", "inf", "1e400", "1e-400 px"}) {
     CHECK(contains(
         cameras_error(file_of(fmt::format("\"fl_x\": \"{}\", ", text), frame_with(matrix_json(1)))),
         "'fl_x' is not"));
@@ -131,8 +137,30 @@ TEST_CASE("angles of view are read in degrees too, of the file or the frame") {
   CHECK(cameras[2].fx == doctest::Approx(20).epsilon(1e-12));
   CHECK(cameras[2].fy == doctest::Approx(15 * std::numbers::sqrt3).epsilon(1e-12));
   CHECK(cameras[3].fy == 33);
-  CHECK(contains(cameras_error(file_of("\"x_fov\": 180, ", frame_with(matrix_json(1)))),
-                 "180 degrees"));
+}
+
+TEST_CASE("angles that no plane has are refused where they count") {
+  const auto read = [](const std::string& keys, const std::string& frame_keys = "") {
+    return cameras_of(
+               file_of("\"w\": 40, \"h\": 30, " + keys, frame_with(matrix_json(1), frame_keys)))
+        .front();
+  };
+  const auto refused = [&](const std::string& keys) { return data_error([&] { read(keys); }); };
+  for (const char* key : {"\"x_fov\": 180, ", "\"y_fov\": 200, ", "\"camera_angle_x\": 3.2, "}) {
+    CHECK(contains(refused(key), "frame 0 has an angle of view of "));
+    CHECK(contains(refused(key), "no plane shows 180 degrees"));
+  }
+  CHECK(contains(refused("\"camera_angle_x\": 6.2831853, \"x_fov\": 60, "), "of 360 degrees"));
+  CHECK(contains(refused("\"x_fov\": 0, "), "not positive"));
+  CHECK(contains(refused("\"camera_angle_y\": -1, "), "not positive"));
+  const std::string turn = "\"camera_angle_x\": 6.283185307179586, ";
+  CHECK(read(turn + "\"camera_model\": \"EQUIRECTANGULAR\", ").model ==
+        CameraModel::kEquirectangular);
+  CHECK(
+      read("\"camera_angle_x\": 3.3161, \"camera_model\": \"OPENCV_FISHEYE\", \"fl_x\": 12, ").fx ==
+      12);
+  CHECK(read("\"x_fov\": 190, \"fl_x\": 12, ").fx == 12);
+  CHECK(read(turn, "\"x_fov\": 90, ").fx == doctest::Approx(20).epsilon(1e-12));
 }
 
 TEST_CASE("matrices may be three rows, or one list; transposed ones are refused by name") {
@@ -173,6 +201,28 @@ TEST_CASE("keys of other programs: scales of the scene do nothing, axes of the c
           .front(),
       expected);
   CHECK(log.contains("Mitsuba"));
+}
+
+TEST_CASE("what is true or false may be 1 or 0, and is refused where it is neither") {
+  const auto model = [](const std::string& value) {
+    return cameras_of(
+               file_of(kKeys + "\"is_fisheye\": " + value + ", ", frame_with(matrix_json(1))))
+        .front()
+        .model;
+  };
+  for (const char* yes : {"true", "1", "1.0", "\"1\""}) CHECK(model(yes) == CameraModel::kFisheye);
+  for (const char* no : {"false", "0", "null"}) CHECK(model(no) == CameraModel::kPinhole);
+  for (const char* other : {"2", "\"true\"", "[true]"}) {
+    CHECK(contains(data_error([&] { model(other); }),
+                   "the file: 'is_fisheye' is neither true nor false"));
+  }
+  CHECK(contains(cameras_error(file_of(kKeys + "\"from_na\": 3, ", frame_with(matrix_json(1)))),
+                 "'from_na' is neither true nor false"));
+  const Camera camera = cameras_of(file_of(kKeys + "\"from_na\": 1, ",
+                                           frame_with("[[0.8, 0, 0.6, 7], [0, 1, 0, 2], "
+                                                      "[-0.6, 0, 0.8, 3], [0, 0, 0, 1]]")))
+                            .front();
+  CHECK(glm::length(camera.rotation * glm::dvec3(0.6, 0, 0.8) - glm::dvec3(0, 0, 1)) < 1e-12);
 }
 
 TEST_CASE("frames without a photo are left out and told, where most have one") {
@@ -216,6 +266,26 @@ TEST_CASE("photos are found in another letter case, unless two differ in nothing
   const LogCapture log;
   CHECK(load_dataset(scratch.path()).views.size() == 2);
   CHECK(log.contains("'images/A.jpg' of frame 0"));
+}
+
+TEST_CASE("a data set that is reached by a link has the photos beside it, and nothing is told") {
+  const Scratch scratch;
+  const Scratch other;
+  fs::create_directory(scratch / "scene");
+  write_scene(scratch, {"../images/a.png", "../images/b.png"}, {"images/a.png", "images/b.png"});
+  fs::rename(scratch / "transforms.json", scratch / "scene/transforms.json");
+  write_image(other / "images/a.png", Image(40, 30, 3, 0.9f));
+  fs::create_directory_symlink(scratch / "scene", other / "scene");
+  const LogCapture log;
+  const Dataset dataset = load_dataset(other / "scene");
+  CHECK(log.lines() == 0);
+  REQUIRE(dataset.views.size() == 2);
+  for (const View& view : dataset.views)
+    CHECK(fs::equivalent(view.image_path.parent_path(), scratch / "images"));
+  // A photo that is found by the end of its path keeps its name on such a way.
+  write_scene(scratch, {"/old/images/a.png", "/old/images/b.png"}, {});
+  for (const View& view : load_dataset(other / "scene/..").views)
+    CHECK(view.camera.name == "images/" + view.image_path.filename().string());
 }
 
 TEST_CASE("photos are found with another extension, unless two are, or a frame has the photo") {
@@ -272,6 +342,7 @@ TEST_CASE("intrinsics of another size than the photos' are warned of") {
   CHECK(warns(R"("camera_angle_x": 1.29, )") == 2);
   CHECK(warns(R"("w": 20, "h": 15, "camera_angle_x": 0.395, )") == 0);
   CHECK(warns(R"("camera_model": "OPENCV_FISHEYE", "camera_angle_x": 1.29, )") == 0);
+  CHECK(warns(R"("camera_angle_x": 3.3, )") == 2);
   CHECK(warns(R"("cx": 10, "cy": 7.5, "camera_angle_x": 0.395, )") == 3);
 }
 
@@ -377,6 +448,9 @@ TEST_CASE("cameras.json of trainers of 3DGS is read as cameras without lenses") 
   CHECK(cameras[1].model == CameraModel::kEquirectangular);
   CHECK(cameras[1].fx == 20);
   CHECK(cameras[1].fy == 30);
+  // As editors of Windows save it.
+  CHECK(cameras_of("\xEF\xBB\xBF[{" + pose + ", \"fx\": 50, \"fy\": 50}]").size() == 1);
+  CHECK(contains(cameras_error("\xEF\xBB\xBF[]"), "lists no cameras"));
   CHECK(contains(cameras_error("[]"), "lists no cameras"));
   CHECK(contains(cameras_error("[{" + pose + "}, 3]"), "entry 1 is no view"));
   CHECK(contains(cameras_error("[{"), "no valid JSON"));

@@ -84,7 +84,24 @@ TEST_CASE("glTF Gaussians: nodes move and scale, and may show a mesh twice") {
     file.json["nodes"].push_back({{"mesh", 0}});
     file.json["scenes"][0]["nodes"].push_back(2 + i);
   }
-  CHECK(contains(error_of(file), "more than 64 times"));
+  CHECK(contains(error_of(file), "show 204 Gaussians, more than 64 times the 2 that it holds"));
+}
+
+TEST_CASE("glTF Gaussians: how often nodes may show a mesh does not go by their order") {
+  GltfFile file = two();
+  file.json["meshes"].push_back(file.json["meshes"][0]);
+  file.json["nodes"] = {{{"mesh", 1}}};
+  json order = json::array();
+  for (int i = 1; i <= 65; ++i) {
+    file.json["nodes"].push_back({{"mesh", 0}});
+    order.push_back(i);
+  }
+  for (const bool first : {true, false}) {
+    file.json["scenes"] = {{{"nodes", order}}};
+    file.json["scenes"][0]["nodes"].insert(
+        first ? file.json["scenes"][0]["nodes"].begin() : file.json["scenes"][0]["nodes"].end(), 0);
+    CHECK(read(file).size() == 132);
+  }
 }
 
 TEST_CASE("glTF Gaussians: a written GLB reads back as it was, but for harmonics of degree 4") {
@@ -158,6 +175,15 @@ TEST_CASE("glTF Gaussians: what is not understood or damaged ends in one sentenc
   file = two();
   file.json["meshes"][0]["primitives"][0]["attributes"].erase(std::string(kExtension) + ":SCALE");
   CHECK(contains(error_of(file), "SCALE"));
+  const std::string harmonic = std::string(kExtension) + ":SH_DEGREE_1_COEF_";
+  for (int missing = 0; missing < 3; ++missing) {
+    file = two();
+    json& attributes = file.json["meshes"][0]["primitives"][0]["attributes"];
+    for (int n = 0; n < 3; ++n) {
+      if (n != missing) attributes[harmonic + std::to_string(n)] = attributes["POSITION"];
+    }
+    CHECK(contains(error_of(file), "Gaussians have no " + harmonic + std::to_string(missing)));
+  }
   file = two();
   file.json["accessors"][0]["count"] = 1000000000;
   CHECK(contains(error_of(file), "do not lie within"));

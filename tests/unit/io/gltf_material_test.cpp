@@ -183,12 +183,24 @@ TEST_CASE("glTF materials: alpha of a texture that would cut out is left out wit
 
 TEST_CASE("glTF materials: blended alpha makes transparent, even of metal") {
   json material = pbr(1.0, 0.1);
-  material["alphaMode"] = "MASK";
+  material["alphaMode"] = "OPAQUE";
   CHECK(mapped(material).kind == Kind::kMirror);
   material["alphaMode"] = "BLEND";
   const Material clear = mapped(material);
   CHECK(clear.kind == Kind::kTransparent);
   CHECK(clear.opacity == 0.25f);
+}
+
+TEST_CASE("glTF materials: masked alpha below the cutoff shows nothing") {
+  json material = pbr(1.0, 0.1);
+  material["emissiveFactor"] = {1, 1, 1};
+  material["alphaMode"] = "MASK";
+  const Material unseen = mapped(material);
+  CHECK(unseen.kind == Kind::kTransparent);
+  CHECK(unseen.opacity == 0.0f);
+  CHECK(unseen.emission == Rgb{0, 0, 0});
+  material["alphaCutoff"] = 0.25;
+  CHECK(mapped(material).kind == Kind::kMirror);
 }
 
 TEST_CASE("glTF materials: emission with its strength") {
@@ -294,6 +306,9 @@ TEST_CASE("glTF materials: texture coordinates follow their set and transform") 
   };
   CHECK(uvs({{"index", 0}, {"texCoord", 1}}) == std::vector<float>{1, 1, 1, 1, 1, 1});
   CHECK(uvs({{"index", 0}, {"texCoord", 7}}).empty());
+  // A material of a scene file may have a texture where the file's own has none.
+  write_bytes(scratch / "m.glb", textured(json::object()).glb());
+  CHECK(io::read_mesh(scratch / "m.glb").mesh.uvs == std::vector<float>{0, 0, 1, 0, 0.5f, 1});
   const auto moved = uvs(
       {{"index", 0},
        {"extensions",
@@ -303,6 +318,31 @@ TEST_CASE("glTF materials: texture coordinates follow their set and transform") 
   const std::vector<float> expected{0.5f, 0.25f, 0.5f, -1.75f, 4.5f, -0.75f};
   REQUIRE(moved.size() == 6);
   for (std::size_t i = 0; i < 6; ++i) CHECK(moved[i] == doctest::Approx(expected[i]));
+}
+
+TEST_CASE("glTF materials: a sampler that does not repeat is told of once, where it matters") {
+  const auto told = [](const json& sampler, const std::vector<float>& uvs) {
+    GltfFile file = GltfFile::triangle_with(base_texture({{"index", 0}}));
+    file.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = file.add_vec2(uvs);
+    file.json["meshes"][0]["primitives"].push_back(file.json["meshes"][0]["primitives"][0]);
+    file.json["images"].push_back({{"uri", "data:image/png;base64," + base64(png())}});
+    file.json["textures"].push_back({{"source", 0}, {"sampler", 0}});
+    file.json["samplers"].push_back(sampler);
+    const LogCapture log;
+    read_gltf_mesh(file.glb());
+    CHECK(log.lines() == (log.contains("m.glb: the wrapping of the texture") ? 1 : 0));
+    return log.lines() == 1;
+  };
+  const std::vector<float> within{0, 0, 1, 0, 0.5f, 1};
+  const std::vector<float> wide{0, 0, 1, 0, 0.5f, 2};
+  const std::vector<float> left{-1, 0, 1, 0, 0.5f, 1};
+  CHECK(told({{"wrapT", 33071}}, wide));
+  CHECK(told({{"wrapS", 33648}}, left));
+  CHECK_FALSE(told({{"wrapS", 33071}}, wide));
+  CHECK_FALSE(told({{"wrapS", 33071}, {"wrapT", 33648}}, within));
+  CHECK_FALSE(told({{"wrapS", 10497}, {"wrapT", 10497}}, wide));
+  CHECK_FALSE(told({{"wrapT", "clamp"}}, wide));
+  CHECK_FALSE(told(json::object(), wide));
 }
 
 TEST_CASE("glTF materials: textures of other properties count with their mean") {

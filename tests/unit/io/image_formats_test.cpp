@@ -94,6 +94,54 @@ TEST_CASE("photos may be GIF, TGA, HEIF or AVIF, and be called as Windows calls 
   }
 }
 
+TEST_CASE("a fourth number that the format does not use is no alpha where it is 0 everywhere") {
+  const Scratch scratch;
+  const auto channels = [&](const char* name, const std::string& bytes) {
+    write_bytes(scratch / name, bytes);
+    const Image image = read_image(scratch / name);
+    REQUIRE(image.width == 2);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto stride = static_cast<std::size_t>(image.channels);
+      CHECK(255 * image.data[stride + c] == doctest::Approx(60.0 - 10.0 * static_cast<double>(c)));
+    }
+    return image.channels;
+  };
+  const auto pixels = [](int alpha) {
+    std::string out("\x0a\x14\x1e\0\x28\x32\x3c\0", 8);  // blue, green, red
+    out[7] = static_cast<char>(alpha);
+    return out;
+  };
+  // The header of Windows 3 has 40 bytes, those since with a mask of alpha 108 or 124.
+  const auto bmp = [&](std::uint32_t header, std::uint32_t mask, int alpha) {
+    std::string bytes = "BM";
+    for (const std::uint32_t number : {22 + header, 0u, 14 + header, header, 2u, 1u})
+      put(bytes, number);
+    put<std::uint16_t>(bytes, 1);
+    put<std::uint16_t>(bytes, 32);
+    put<std::uint32_t>(bytes, header > 40 ? 3 : 0);
+    for (const std::uint32_t number : {8u, 0u, 0u, 0u, 0u}) put(bytes, number);
+    for (const std::uint32_t number : {0xff0000u, 0xff00u, 0xffu, mask}) put(bytes, number);
+    bytes.resize(14 + header);
+    return bytes + pixels(alpha);
+  };
+  CHECK(channels("a.bmp", bmp(40, 0, 0)) == 3);
+  CHECK(channels("a.bmp", bmp(40, 0, 7)) == 4);
+  CHECK(channels("a.bmp", bmp(124, 0, 0)) == 3);
+  CHECK(channels("a.bmp", bmp(124, 0xff000000u, 0)) == 4);
+  const auto targa = [&](int alpha_bits, int alpha) {
+    std::string header(18, '\0');
+    header[2] = 2;
+    header[12] = 2;
+    header[14] = 1;
+    header[16] = 32;
+    header[17] = static_cast<char>(0x20 + alpha_bits);
+    return header + pixels(alpha);
+  };
+  CHECK(channels("a.tga", targa(0, 0)) == 3);
+  CHECK(channels("a.tga", targa(0, 7)) == 4);
+  CHECK(channels("a.tga", targa(8, 0)) == 4);
+}
+
 TEST_CASE("files that only begin as such pictures are refused in one sentence") {
   const Scratch scratch;
   CHECK(!refusal(scratch / "a.gif", "GIF89a").empty());

@@ -241,6 +241,64 @@ TEST_CASE("OBJ: MTL materials map row by row") {
   CHECK(glow.emission == Rgb{1, 0, 0});
 }
 
+TEST_CASE("OBJ: a material without Kd shows its texture as it is, whatever comes before it") {
+  const Scratch scratch;
+  write_image(scratch / "t.png", Image(2, 2, 3, 0.5f));
+  write_bytes(scratch / "m.obj", "mtllib m.mtl\n" + kSquare + "vt 0 0\nusemtl a\nf 1/1 2/1 3/1\n");
+  const auto color = [&](const std::string& mtl) {
+    write_bytes(scratch / "m.mtl", mtl);
+    return io::read_mesh(scratch / "m.obj").materials.at(0).color;
+  };
+  for (const std::string mtl :
+       {"newmtl a\nKd 1 1 1\nmap_Kd t.png\n", "newmtl a\nmap_Kd t.png\n",
+        "newmtl a\n\tmap_Kd t.png\n\tKd\t1 1 1\n", "newmtl z\nKd 0 0 1\nnewmtl a\nmap_Kd t.png\n",
+        "newmtl a\nmap_Kd t.png\nnewmtl z\nKd 0 0 1\n"}) {
+    CAPTURE(mtl);
+    CHECK(color(mtl) == Rgb{1, 1, 1});
+  }
+  CHECK(color("newmtl z\nKd 0 0 1\nnewmtl a\nNs 3\n") == Material{}.color);
+  CHECK(color("newmtl a\nKd 0 0 0\nmap_Kd t.png\n") == Rgb{0, 0, 0});
+  CHECK(mapped("Ke 2 3 4\n").kind == Kind::kEmissive);
+}
+
+TEST_CASE("OBJ: a single number of an MTL is a grey, and -halo is no opacity") {
+  CHECK(mapped("Kd 0.5\n").color == Rgb{0.5f, 0.5f, 0.5f});
+  CHECK(mapped("\tKd\t0.25 # dark\r\n").color == Rgb{0.25f, 0.25f, 0.25f});
+  CHECK(mapped("Kd 0 0 0\nKe 3\n").emission == Rgb{3, 3, 3});
+  CHECK(mapped("Ks 0.6\nNs 3\n").specular == doctest::Approx(0.6));
+  CHECK(mapped("Kd 0.5 0 1\nd -halo 0.25\n").opacity == 0.25f);
+  CHECK(mapped("Kd 0.5 0 1\nd 0.25\n").opacity == 0.25f);
+}
+
+TEST_CASE("OBJ: a comment behind a texture is no part of its name, unless a file has it") {
+  const Scratch scratch;
+  write_image(scratch / "t.png", Image(3, 2, 3, 0.5f));
+  write_bytes(scratch / "m.obj", "mtllib m.mtl\n" + kSquare + "usemtl a\nf 1 2 3\n");
+  write_bytes(scratch / "m.mtl", "newmtl a\nmap_Kd t.png\t# of the front\n");
+  CHECK(io::read_mesh(scratch / "m.obj").textures.at(0).width == 3);
+  write_image(scratch / "t #1.png", Image(5, 2, 3, 0.5f));
+  write_bytes(scratch / "m.mtl", "newmtl a\nmap_Kd t #1.png\n");
+  CHECK(io::read_mesh(scratch / "m.obj").textures.at(0).width == 5);
+}
+
+TEST_CASE("OBJ: mtllib without a name, or of a folder, leaves the default material") {
+  const Scratch scratch;
+  fs::create_directories(scratch / "maps");
+  const auto read_with = [&](const std::string& line) {
+    write_bytes(scratch / "m.obj", line + "\n" + kSquare + "usemtl a\nf 1 2 3\n");
+    return io::read_mesh(scratch / "m.obj").materials.at(0).color;
+  };
+  const LogCapture log;
+  CHECK(read_with("mtllib") == Material{}.color);
+  CHECK(read_with("mtllib   ") == Material{}.color);
+  CHECK(log.lines() == 0);
+  for (const std::string line : {"mtllib maps", "mtllib .", "mtllib maps/"}) {
+    CHECK(read_with(line) == Material{}.color);
+    CHECK(log.contains("m.obj: there is no material file "));
+  }
+  CHECK(log.lines() == 3);
+}
+
 TEST_CASE("OBJ: the first map_d of an MTL that is used is left out with a warning") {
   const std::string mtl = "newmtl a\nmap_d leaf.png\nnewmtl b\nmap_d -clamp on leaf.png\n";
   const LogCapture log;

@@ -245,7 +245,8 @@ TEST_CASE("integers of 32 bits are a photo where they fill their range, else of 
   CHECK(read_image(write_row<std::uint32_t>(path, {"Y"}, {0, 0})).data == std::vector<float>{0, 0});
   const auto message = [&] { return data_error([&] { read_image(path); }); };
   write_row<std::uint32_t>(path, {"R", "G", "B"}, {12, 255, 7, 0, 1, 2});
-  CHECK(contains(message(), "a.tif has integers of 32 bits, of which the greatest is 255"));
+  CHECK(
+      contains(message(), "a.tif has integers of more than 16 bits, of which the greatest is 255"));
   write_row<std::int32_t>(path, {"Y"}, {-9, 65535, 40});
   CHECK(contains(message(), "the greatest is 65535"));
   // Alpha tells nothing of white.

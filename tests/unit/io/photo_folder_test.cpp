@@ -83,6 +83,59 @@ TEST_CASE("photos of a COLMAP model are found in another letter case, which is t
   CHECK(log.contains("'photo 8.png' among them: they are left out"));
 }
 
+TEST_CASE("COLMAP photos of another extension are taken where there is one of them, and told") {
+  const Scratch scratch;
+  ColmapFixture fixture = small_colmap();
+  for (auto& image : fixture.images) image.name.replace(image.name.size() - 3, 3, "jpg");
+  fixture.write_text(scratch / "sparse/0");
+  write_photos(fixture, scratch / "images", 40, 30);
+  // Pictures of the same stem are none of the photos, in whatever case their extension is.
+  for (const char* other : {"images/photo 8.png", "images/photo 8.exr"})
+    write_image(scratch / other, Image(40, 30, 3, 1.0f));
+  const auto photo_of = [&](const Dataset& dataset) {
+    const auto view =
+        std::find_if(dataset.views.begin(), dataset.views.end(),
+                     [](const View& each) { return each.camera.name == "photo 8.jpg"; });
+    return view == dataset.views.end() ? "" : view->image_path.filename().string();
+  };
+  fs::rename(scratch / "images/photo 8.jpg", scratch / "images/photo 8.JPG");
+  {
+    const LogCapture log;
+    CHECK(photo_of(load_dataset(scratch.path())) == "photo 8.JPG");
+    CHECK(log.lines() == 0);
+  }
+  fs::rename(scratch / "images/photo 8.JPG", scratch / "images/photo 8.Jpg");
+  {
+    const LogCapture log;
+    CHECK(photo_of(load_dataset(scratch.path())) == "photo 8.Jpg");
+    CHECK(log.lines() == 1);
+    CHECK(log.contains("1 of 10 photos are spelt otherwise"));
+  }
+  fs::remove(scratch / "images/photo 8.Jpg");
+  {
+    const LogCapture log;
+    CHECK(photo_of(load_dataset(scratch.path())).empty());
+    CHECK(log.contains("'photo 8.jpg' among them: they are left out"));
+  }
+  fs::remove(scratch / "images/photo 8.exr");
+  const LogCapture log;
+  CHECK(photo_of(load_dataset(scratch.path())) == "photo 8.png");
+  CHECK(log.lines() == 1);
+  CHECK(log.contains("1 of 10 photos have another extension than"));
+  CHECK(log.contains("('photo 8.jpg')"));
+}
+
+TEST_CASE("COLMAP photos developed from raw files are found, which is told") {
+  const Scratch scratch;
+  ColmapFixture fixture = small_colmap();
+  write_photos(fixture, scratch / "images", 40, 30);
+  for (auto& image : fixture.images) image.name.replace(image.name.size() - 3, 3, "cr2");
+  fixture.write_text(scratch / "sparse/0");
+  const LogCapture log;
+  CHECK(load_dataset(scratch.path()).views.size() == 10);
+  CHECK(log.contains("10 of 10 photos have another extension than"));
+}
+
 TEST_CASE("reduced copies of other names than the model's are left for images, which is told") {
   const Scratch scratch;
   const ColmapFixture fixture = small_colmap();

@@ -135,6 +135,17 @@ TEST_CASE("reduction of 8 and 16 bits works on unrounded sums") {
   }
 }
 
+TEST_CASE("a mask of another size is taken at the centres of a photo's pixels") {
+  io::MaskPlane mask{8, 4, {}};
+  for (int i = 0; i < 32; ++i) mask.values.push_back(static_cast<float>(i));
+  // Centres 1, 3, 5 of 6 lie in columns 1, 4 and 6 of 8; 1 and 3 of 4 in rows 1 and 3.
+  const Image out = collected(*io::mask_rows(mask, 3, 2));
+  const int expected[] = {9, 12, 14, 25, 28, 30};
+  for (int i = 0; i < 6; ++i) CHECK(out.at(i % 3, i / 3, 3) == static_cast<float>(expected[i]));
+  const Image large = collected(*io::mask_rows(mask, 16, 8));
+  for (int x = 0; x < 16; ++x) CHECK(large.at(x, 2, 3) == static_cast<float>(8 + x / 2));
+}
+
 TEST_CASE("transparent pixels do not bleed into the average") {
   Image image(2, 1, 4);
   image.data = {1.0f, 0.5f, 0.25f, 1.0f, 0.0f, 0.0f, 0.0f, 0.0f};

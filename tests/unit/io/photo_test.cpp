@@ -171,7 +171,6 @@ TEST_CASE("a photo is the picture of its view, rounded once to the precision of 
       for (const bool apart : {false, true}) {
         for (const bool lens : {false, true}) {
           for (const bool smaller : {false, true}) {
-            if (apart && !masked) continue;
             View view = view_of(paths[i]);
             if (masked) view.mask_path = scratch / "mask.png";
             view.mask_apart = apart;

@@ -2,10 +2,13 @@
 #include "io/photo_transparency.hpp"
 
 #include <doctest/doctest.h>
+#include <fmt/format.h>
 
+#include <cmath>
 #include <functional>
 #include <string>
 
+#include "io/photo.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -35,22 +38,27 @@ float holes(int photo, int x, int y) {
 // Two corners that a lens does not fill.
 float corners(int /*photo*/, int x, int y) { return x + y < 8 || x + y > 61 ? 0.0f : 1.0f; }
 
-// A data set of grey photos: transforms.json of nerfstudio, or `file` of another kind.
+// A data set of photos: transforms.json of nerfstudio, or `file` of another kind.
 void write_photos(const Scratch& scratch,
                   const Alpha& alpha,
-                  const std::string& file = "transforms.json") {
+                  const std::string& file = "transforms.json",
+                  const std::string& keys = "") {
   std::string frames;
   for (int photo = 0; photo < kPhotos; ++photo) {
     Image image(kWidth, kHeight, 4, 0.5f);
     for (int y = 0; y < kHeight; ++y) {
-      for (int x = 0; x < kWidth; ++x) image.at(x, y, 3) = alpha(photo, x, y);
+      for (int x = 0; x < kWidth; ++x) {
+        image.at(x, y, 0) = static_cast<float>(x) / kWidth;
+        image.at(x, y, 3) = alpha(photo, x, y);
+      }
     }
     const std::string name = "photo_" + std::to_string(photo) + ".png";
     write_image(scratch / name, image);
     frames += std::string(photo > 0 ? ", " : "") + "{\"file_path\": \"" + name +
               "\", \"transform_matrix\": " + matrix_json(photo) + "}";
   }
-  write_bytes(scratch / file, "{\"camera_angle_x\": 0.8, \"frames\": [" + frames + "]}");
+  write_bytes(scratch / file,
+              "{" + keys + "\"camera_angle_x\": 0.8, \"frames\": [" + frames + "]}");
 }
 
 bool background(const Scratch& scratch, AlphaUse use = AlphaUse::kAuto) {
@@ -190,6 +198,89 @@ TEST_CASE("a mask of cut-out photos is a plane of its own, whoever wrote the dat
   CHECK(picture.weight.at(20, 9, 0) == 1.0f);
   CHECK(picture.rgba.at(10, 9, 3) == 1.0f);
   CHECK(picture.rgba.at(2, 9, 3) == 0.0f);
+}
+
+TEST_CASE("masks that cut out say nothing of what photos do not show: white ones change nothing") {
+  for (const bool with_alpha : {true, false}) {
+    for (const bool lens : {true, false}) {
+      CAPTURE(with_alpha);
+      CAPTURE(lens);
+      const Scratch scratch;
+      const auto alpha = [&](int photo, int x, int y) {
+        return with_alpha ? holes(photo, x, y) : 1.0f;
+      };
+      write_photos(scratch, alpha, "transforms.json",
+                   lens ? "\"k1\": 0.3, \"camera_model\": \"OPENCV\", " : "");
+      DatasetOptions options;
+      options.alpha = AlphaUse::kIgnore;
+      options.downscale = 2;
+      const Dataset bare = load_dataset(scratch.path(), options);
+      // All but one, as photos without a mask count whole.
+      for (int i = 1; i < kPhotos; ++i)
+        write_image(scratch / fmt::format("masks/photo_{}.png", i),
+                    Image(kWidth, kHeight, 1, 1.0f));
+      options.masks = MaskUse::kCutout;
+      const Dataset cut = load_dataset(scratch.path(), options);
+      REQUIRE(cut.views.size() == bare.views.size());
+      for (std::size_t i = 0; i < cut.views.size(); ++i) {
+        CAPTURE(i);
+        const ViewPicture without = load_view_picture(bare.views[i]);
+        const ViewPicture with = load_view_picture(cut.views[i]);
+        const io::Photo kept = io::load_photo(cut.views[i]);
+        const bool some_unknown = with_alpha || lens;
+        const bool weighted = !with.weight.data.empty();
+        REQUIRE((weighted || !some_unknown));
+        std::size_t unknown = 0;
+        for (int y = 0; y < with.rgba.height; ++y) {
+          for (int x = 0; x < with.rgba.width; ++x) {
+            const float weight = without.rgba.at(x, y, 3);
+            REQUIRE((weighted ? with.weight.at(x, y, 0) : 1.0f) == weight);
+            REQUIRE(std::abs(kept.weight(x, y) - weight) <= 0.5001f / 255);
+            unknown += weight < 1.0f ? 1 : 0;
+            if (weight == 0.0f) continue;
+            REQUIRE(with.rgba.at(x, y, 3) == 1.0f);
+            for (int c = 0; c < 3; ++c) REQUIRE(with.rgba.at(x, y, c) == without.rgba.at(x, y, c));
+          }
+        }
+        CHECK((unknown > 0) == some_unknown);
+      }
+    }
+  }
+}
+
+TEST_CASE("a mask that cuts out is the coverage of what the photo shows") {
+  const Scratch scratch;
+  write_photos(scratch, holes);
+  Image mask(kWidth, kHeight, 1, 1.0f);
+  for (int y = 0; y < kHeight; ++y) mask.at(20, y, 0) = 0.0f;
+  for (int i = 0; i < kPhotos; ++i)
+    write_image(scratch / fmt::format("masks/photo_{}.png", i), mask);
+  DatasetOptions options;
+  options.masks = MaskUse::kCutout;
+  const LogCapture log;
+  const Dataset dataset = load_dataset(scratch.path(), options);
+  CHECK(dataset.alpha_is_background);
+  CHECK(log.contains("and does not count"));
+  const ViewPicture picture = load_view_picture(dataset.views[0]);
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      REQUIRE(picture.weight.at(x, y, 0) == holes(0, x, y));
+      if (picture.weight.at(x, y, 0) > 0) REQUIRE(picture.rgba.at(x, y, 3) == mask.at(x, y, 0));
+    }
+  }
+  // What shows all of its pixels needs no weights.
+  write_image(scratch / "photo_0.png", Image(kWidth, kHeight, 3, 0.5f));
+  const ViewPicture whole = load_view_picture(load_dataset(scratch.path(), options).views[0]);
+  CHECK(whole.weight.data.empty());
+  CHECK(whole.rgba.at(20, 15, 3) == 0.0f);
+  // Of photos that are cut out themselves both say what is background.
+  options.alpha = AlphaUse::kCutout;
+  const ViewPicture both = load_view_picture(load_dataset(scratch.path(), options).views[1]);
+  CHECK(both.weight.data.empty());
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x)
+      REQUIRE(both.rgba.at(x, y, 3) == holes(1, x, y) * mask.at(x, y, 0));
+  }
 }
 
 TEST_CASE("a black mask is of a photo without the body, but leaves nothing where it ignores") {

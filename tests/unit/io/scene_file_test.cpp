@@ -448,7 +448,15 @@ TEST_CASE("scene file: cameras count from the model's origin, data sets are as i
   const std::vector<Camera> more = cameras("data = 'data'\ndownscale = 2\ntest-every = 5\n");
   REQUIRE(more.size() == 2);
   CHECK(more[0].width == 20);
-  CHECK(cameras("data = 'data'\norbit = { frames = 1 }\n").at(0).width == 10);
+  const Camera on_orbit = cameras("data = 'data'\norbit = { frames = 1 }\n").at(0);
+  CHECK(on_orbit.width == 10);
+  CHECK(on_orbit.height == 8);
+  // A panorama has its own shape.
+  const std::string round = "data = 'data'\norbit = {}\nmodel = 'equirectangular'\n";
+  CHECK(cameras(round).at(0).width == 10);
+  CHECK(cameras(round).at(0).height == 5);
+  CHECK(cameras(round + "width = 300\n").at(0).height == 150);
+  CHECK(cameras(round + "height = 30\n").at(0).height == 30);
 }
 
 TEST_CASE("scene file: another size keeps what the smaller side sees") {
@@ -492,6 +500,38 @@ TEST_CASE("scene file: what is wrong is named with its line") {
   usage(kModel + "[[light]]\nkind = 'point'\nposition = [0, 0, 0]\nradius = 1\n", {"'radius'"});
   usage(material + "ior = 1.5\n" + kModel, {"line 4", "'ior' is for kind = \"glass\""});
   usage(kModel + "[camera]\nposition = [0, 0, 1]\ntarget = [0, 0, 0]\nk1 = 1\n", {"'k1'"});
+
+  // Keys that exist, but not for the kind that is chosen.
+  const std::string placed = kModel + "[camera]\nposition = [0, 0, 1]\ntarget = [0, 0, 0]\n";
+  const std::string orbit = kModel + "[camera]\norbit = {}\n";
+  usage(kMesh + "crease-angle = 30\n", {"line 3", "'crease-angle' is for normals = \"smooth\""});
+  usage(kModel + "[[light]]\nkind = 'point'\nposition = [0, 0, 0]\nradius = 1\n",
+        {"line 6", "'radius' is for kind = \"sphere\""});
+  usage(kModel + "[[light]]\nkind = 'point'\nposition = [0, 0, 0]\ndirection = [0, 0, 1]\n",
+        {"'direction' is for kind = \"directional\""});
+  usage(kModel + "[[light]]\nkind = 'directional'\nposition = [0, 0, 0]\ndirection = [0, 0, 1]\n",
+        {"'position' is for the kinds point and sphere"});
+  usage(placed + "k1 = 1\n", {"line 6", "'k1' is for the models opencv and fisheye"});
+  usage(placed + "model = 'fisheye'\np2 = 1\n", {"'p2' is for model = \"opencv\""});
+  usage(placed + "model = 'opencv'\nk4 = 1\n", {"'k4' is for model = \"fisheye\""});
+  usage(placed + "extent = 2\n", {"'extent' is for model = \"orthographic\""});
+  for (const std::string key : {"fov", "focal"}) {
+    for (const std::string model : {"equirectangular", "orthographic"}) {
+      usage(placed + "model = '" + model + "'\n" + key + " = 50\n",
+            {"'" + key + "' is for the models pinhole, opencv and fisheye"});
+    }
+  }
+  usage(orbit + "model = 'equirectangular'\nprincipal-point = [1, 2]\n",
+        {"'principal-point' is for every model but equirectangular"});
+  usage(placed + "split = 'all'\n", {"'split' is for the views of 'data'"});
+  usage(orbit + "undistort = false\n", {"'undistort' is for the views of 'data'"});
+  usage(placed + "views = [1]\n", {"'views' is for 'file' and the views of 'data'"});
+  usage(placed + "downscale = 2\n", {"'downscale' is for 'file' and 'data'"});
+  usage(orbit + "target = [0, 0, 0]\n", {"'target' is for 'position'", "orbit.target"});
+  for (const std::string key : {"width", "model", "fov", "k1"}) {
+    usage(kModel + "[camera]\nfile = 'model.ply'\n" + key + " = 3\n",
+          {"line 5", "'" + key + "' is for 'position' and 'orbit'"});
+  }
 
   usage("model = 3\n", {"line 1", "[[model]]"});
   usage(kModel + "scale = 'big'\n", {"line 3", "'scale'", "list of 3 numbers", "a text"});
@@ -546,6 +586,7 @@ TEST_CASE("scene file: what is wrong is named with its line") {
   usage(kModel + "[camera]\nposition = [0, 0, 1]\ntarget = [0, 0, 0]\nmodel = 'orthographic'\n",
         {"'extent'"});
   usage(kModel + "[camera]\nfile = 'model.ply'\nviews = [-1]\n", {"'views'"});
+  usage(kModel + "[camera]\norbit = {frames = 2.9}\n", {"'frames'", "whole number"});
   usage(kModel + "[camera]\norbit = {frames = 0}\n", {"'frames'"});
 
   for (const std::string& text :
@@ -559,4 +600,43 @@ TEST_CASE("scene file: what is wrong is named with its line") {
     CHECK(contains(message, "none.ply does not exist"));
   }
   CHECK_THROWS_AS(read_scene_file(folder.scratch() / "absent.toml"), DataError);
+}
+
+TEST_CASE("scene file: keys of any number of parts end in a sentence") {
+  const SceneFolder folder;
+  const auto parts = [](int count) {
+    std::string key = "a";
+    for (int i = 1; i < count; ++i) key += ".a";
+    return key;
+  };
+  const auto refusal = [&](const std::string& text) {
+    const std::string message = folder.refused<UsageError>(text);
+    CHECK(!contains(message, "\n"));
+    return message;
+  };
+  for (const int count : {65, 32000}) {
+    CAPTURE(count);
+    for (const std::string& line :
+         {parts(count) + " = 1", "[" + parts(count) + "]", "[[" + parts(count) + "]]",
+          "x = { " + parts(count) + " = 1 }", "'a'.\"b.\\\"\" . " + parts(count - 2) + " = 1",
+          "x = [{}, { b = 2, " + parts(count) + " = 1 }]"}) {
+      CHECK(contains(refusal("\n" + line + "\n"),
+                     "scene.toml, line 2: a key has more than 64 parts"));
+    }
+  }
+  // Tables in tables count together.
+  std::string inner = "1";
+  for (int i = 0; i < 200; ++i) inner = "{ " + parts(60) + " = " + inner + " }";
+  CHECK(contains(refusal("x = " + inner + "\n"), "line 1: a key has more than 64 parts"));
+  // What is no key may have any number of dots.
+  const std::string dots(500, '.');
+  std::string values;
+  for (int i = 0; i < 200; ++i) values += "1.5, 1979-05-27T07:32:00.5, ";
+  for (const std::string& line :
+       {parts(64) + " = 1", "x = '" + dots + "'", "x = \"\"\"" + dots + "\n" + dots + "\"\"\"",
+        "x = 1 # " + parts(500), "x = [" + values + "]", "'" + dots + "' = 1",
+        "x = [{" + parts(50) + " = 1}, {" + parts(50) + " = 1}]"}) {
+    CAPTURE(line);
+    CHECK(contains(refusal(line + "\n"), "unknown key"));
+  }
 }

@@ -155,6 +155,71 @@ TEST_CASE("scene loader: pictures of materials that are replaced everywhere are 
     CHECK(contains(data_error([&] { folder.load(seen + paper); }), "print.png"));
 }
 
+TEST_CASE(
+    "scene loader: triangles without texture coordinates have no texture, which is told once") {
+  const Folder folder;
+  const std::string corners = "mtllib sheet.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\n";
+  write_bytes(folder.scratch() / "bare.obj", corners + "usemtl Printed\nf 1 2 3\nf 1 3 4\n");
+  write_bytes(folder.scratch() / "part.obj", corners + "usemtl Printed\nf 1/1 2/1 3/1\nf 1 3 4\n");
+  const std::string camera =
+      "[[material]]\nname = 'paper'\nkind = 'diffuse'\ntexture = 'grey.png'\n" + kCamera;
+  const auto textured = [](const Scene& scene, std::size_t mesh, std::size_t triangle) {
+    return scene.materials.at(scene.meshes.at(mesh).materials.at(triangle)).texture >= 0;
+  };
+  const std::string sheet = "[[mesh]]\nfile = 'sheet.obj'\nmaterial = 'paper'\n";
+  for (const std::string material : {"", "material = 'paper'\n"}) {
+    CAPTURE(material);
+    for (const std::string file : {"bare.obj", "part.obj"}) {
+      CAPTURE(file);
+      const std::string mesh = "[[mesh]]\nfile = '" + file + "'\n" + material;
+      const LogCapture log;
+      const Scene scene = folder.load(mesh + mesh + sheet + camera).scene;
+      CHECK(log.lines() == 1);
+      CHECK(log.contains(file + ": the texture of the material '" +
+                         (material.empty() ? "Printed" : "paper") + "' is left out"));
+      for (const std::size_t copy : {0u, 1u}) {
+        CHECK(textured(scene, copy, 0) == (file == "part.obj"));
+        CHECK_FALSE(textured(scene, copy, 1));
+      }
+      // The other mesh keeps it.
+      CHECK(textured(scene, 2, 0));
+      CHECK(textured(scene, 2, 1));
+    }
+  }
+  const LogCapture log;
+  folder.load(sheet + camera);
+  folder.load(
+      "[[mesh]]\nfile = 'bare.obj'\nmaterial = 'm'\n[[material]]\nname = 'm'\nkind = "
+      "'mirror'\n" +
+      kCamera);
+  CHECK(log.lines() == 0);
+}
+
+TEST_CASE("scene loader: meshes without texture coordinates share materials without textures") {
+  const Folder folder;
+  for (const std::string file : {"one.obj", "two.obj"})
+    write_bytes(folder.scratch() / file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  const std::string one = "[[mesh]]\nfile = 'one.obj'\nmaterial = 'pane'\n";
+  const std::string two = "[[mesh]]\nfile = 'two.obj'\nmaterial = 'pane'\n";
+  const std::string pane =
+      "[[material]]\nname = 'pane'\nkind = 'glass'\ntexture = 'grey.png'\n" + kCamera;
+  const LogCapture once;
+  const std::size_t materials = folder.load(one + pane).scene.materials.size();
+  CHECK(once.lines() == 2);  // the texture, and the open glass
+  {
+    const LogCapture log;
+    CHECK(folder.load(one + one + one + pane).scene.materials.size() == materials);
+    CHECK(log.lines() == 2);
+  }
+  const LogCapture log;
+  folder.load(one + two + one + pane);
+  for (const std::string file : {"one.obj", "two.obj"}) {
+    CHECK(log.contains(file + ": the texture of the material 'pane' is left out"));
+    CHECK(log.contains(file + ": the glass of the material 'pane' is open"));
+  }
+  CHECK(log.lines() == 4);
+}
+
 TEST_CASE("scene loader: normals and placement of meshes") {
   const Folder folder;
   const LoadedScene loaded = folder.load(R"(

@@ -79,3 +79,18 @@ TEST_CASE("frames that are larger than a video's format are refused") {
   const std::string bytes = read_bytes(scratch / "b.gif");
   CHECK(bytes.substr(6, 4) == std::string("\xff\xff\x01\x00", 4));
 }
+
+TEST_CASE("frames that stay for longer than a video's format can say are refused") {
+  const Scratch scratch;
+  for (const auto& [name, seconds] : {std::pair("a.gif", 655.35), {"a.apng", 65.535}}) {
+    CAPTURE(name);
+    CHECK(contains(usage_error([&] { open_video(scratch / name, {0.999 / seconds, 1}); }), name));
+    const auto video = open_video(scratch / name, {1.0 / seconds, 1});
+    video->add(Image(2, 2, 3, 0.5f));
+    video->finish();
+    const std::string bytes = read_bytes(scratch / name);
+    const bool gif = name == std::string("a.gif");
+    const std::size_t at = gif ? bytes.find("\x21\xf9") + 4 : bytes.find("fcTL") + 24;
+    CHECK(bytes.substr(at, 2) == "\xff\xff");
+  }
+}

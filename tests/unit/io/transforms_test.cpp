@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 #include <string>
 
 #include "raysplats/dataset.hpp"
@@ -175,6 +176,37 @@ TEST_CASE("cameras of every model are written and read back, together and one by
   }
 }
 
+TEST_CASE("cameras that could not be read back are not written, and what was there stays") {
+  const Scratch scratch;
+  const Camera sound = look_at({3, 2, 0.1}, {0, 0.5, 0}, {0, 0, 1}, 64, 48, 70);
+  const auto path = scratch / "cameras.json";
+  write_cameras(path, {sound});
+  const std::string before = read_bytes(path);
+  const auto refused = [&](const char* what, auto&& spoil) {
+    CAPTURE(what);
+    Camera camera = sound;
+    camera.name = "a.png";
+    spoil(camera);
+    const std::string message = message_of<UsageError>([&] {
+      write_cameras(path, {sound, camera});
+    });
+    INFO(message);
+    CHECK(contains(message, "'a.png'"));
+    CHECK((read_bytes(path) == before));
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  refused("fx", [&](Camera& c) { c.fx = nan; });
+  refused("cy", [&](Camera& c) { c.cy = nan; });
+  refused("pose", [&](Camera& c) { c.translation.y = nan; });
+  refused("rotation", [&](Camera& c) { c.rotation = 2.0 * c.rotation; });
+  refused("distortion", [&](Camera& c) {
+    c.model = CameraModel::kOpenCv;
+    c.distortion.k2 = nan;
+  });
+  refused("no pixels", [](Camera& c) { c.height = 0; });
+  refused("no lens", [](Camera& c) { c.model = CameraModel::kPhotoLens; });
+}
+
 TEST_CASE("names of camera models: nerfstudio's, and instant-ngp's flag") {
   const std::string size = "\"w\": 40, \"h\": 20, ";
   const auto model = [&](const std::string& keys) {
@@ -289,7 +321,9 @@ TEST_CASE("malformed camera files are refused with the frame or the line") {
   CHECK(contains(cameras_error(file_of("\"w\": 4.5, \"h\": 4, ", frame("a", 1))), "'w' is 4.5"));
   CHECK(
       contains(cameras_error(file_of("\"w\": 1e30, \"h\": 4, ", frame("a", 1))), "no image size"));
-  CHECK(contains(cameras_error(file_of("\"camera_angle_x\": 4, ", frame("a", 1))), "no angle"));
+  CHECK(
+      contains(cameras_error(file_of("\"w\": 4, \"h\": 4, \"camera_angle_x\": 4, ", frame("a", 1))),
+               "no plane"));
   CHECK(contains(cameras_error(file_of("\"camera_model\": \"MEI\", ", frame("a", 1))), "'MEI'"));
   CHECK(contains(cameras_error(file_of("", frame("a", 1, "\"camera_model\": \"VR180_L\", "))),
                  "frame 0"));

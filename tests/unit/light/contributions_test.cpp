@@ -80,3 +80,19 @@ TEST_CASE("contributions of many and large views are those of fewer and smaller 
       contributions(context, model, std::vector<Camera>(100, downscaled(large, 8.0)), {});
   for (std::size_t i = 0; i < 3; ++i) CHECK(many[i] == doctest::Approx(one[i]).epsilon(0.03));
 }
+
+TEST_CASE("contributions can be stopped, and hear how far they are") {
+  Context context(test_device());
+  const std::vector<Camera> cameras(3, look_at({0, 0, -6}, {0, 0, 0}, {0, -1, 0}, 60, 40, 50.0));
+  double last = 0;
+  const auto listen = [&](double share) {
+    CHECK(share >= last);
+    last = share;
+    return true;
+  };
+  const std::vector<double> expected = contributions(context, discs(), cameras, {});
+  CHECK(contributions(context, discs(), cameras, {}, {}, listen) == expected);
+  CHECK(last == doctest::Approx(1.0));
+  const auto second_view = [](double share) { return share < 0.5; };
+  CHECK(contributions(context, discs(), cameras, {}, {}, second_view).empty());
+}

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -314,6 +315,82 @@ TEST_CASE("a picture can be stopped while it is drawn") {
     CHECK(whole.data == tracer.render(model, camera).data);
     CHECK(tracer.render(model, camera, false, [](double) { return false; }).data.empty());
     CHECK_THROWS_AS(tracer.depth(), UsageError);
+  }
+}
+
+TEST_CASE("rays can be stopped while they are traced and while their gradients are taken") {
+  Context context = make_test_context();
+  const Model model(context, reference::random_scene(60, 43, 1));
+  for (const bool in_batches : {true, false}) {
+    CAPTURE(in_batches);
+    const int least = in_batches ? 3 : 1;
+    TraceOptions options;
+    if (in_batches) options.memory_budget = 1000;
+    Tracer tracer(context, options);
+    const std::vector<Ray> rays = random_rays(10000, 38, 2.0, 0.5, kInfinity);
+    std::vector<RayResultGradient> gradients(rays.size());
+    CounterRng rng(44, 1);
+    for (RayResultGradient& gradient : gradients) gradient = random_gradient(rng);
+    const std::vector<RayResult> expected = tracer.trace(model, rays, ColorDirection::kRay, true);
+    const RaysGradients wanted = tracer.backward(model, gradients);
+
+    // To the end: shares grow up to 1, and nothing else changes.
+    double last = 0;
+    int heard = 0;
+    const auto listen = [&](double share) {
+      CHECK(share >= last);
+      last = share;
+      ++heard;
+      return true;
+    };
+    const std::vector<RayResult> results =
+        tracer.trace(model, rays, ColorDirection::kRay, true, listen);
+    CHECK(last == 1.0);
+    CHECK(heard >= least);
+    REQUIRE(results.size() == rays.size());
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      REQUIRE(results[i].color[1] == expected[i].color[1]);
+      REQUIRE(results[i].hits == expected[i].hits);
+    }
+    last = 0;
+    heard = 0;
+    const RaysGradients got = tracer.backward(model, gradients, listen);
+    CHECK(last == 1.0);
+    CHECK(heard >= least);
+    REQUIRE(got.rays.size() == rays.size());
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      REQUIRE(got.rays[i].origin[0] == wanted.rays[i].origin[0]);
+    if (context.device().type == DeviceType::kCpu)
+      CHECK(got.parameters.means == wanted.parameters.means);
+
+    // Stopped: there is nothing, and the gradients of what was traced may be asked for again.
+    int calls = 0;
+    const auto stop = [&](double) { return ++calls < 1; };
+    const RaysGradients none = tracer.backward(model, gradients, stop);
+    CHECK(calls == 1);
+    CHECK(none.rays.empty());
+    CHECK(none.parameters.size() == 0);
+    const RaysGradients again = tracer.backward(model, gradients);
+    REQUIRE(again.rays.size() == rays.size());
+    if (context.device().type == DeviceType::kCpu)
+      CHECK(again.parameters.means == wanted.parameters.means);
+    calls = 0;
+    CHECK(tracer.trace(model, rays, ColorDirection::kRay, true, stop).empty());
+    CHECK(calls == 1);
+    CHECK_THROWS_AS(tracer.backward(model, gradients), UsageError);
+    CHECK(tracer.capped_rays() == 0);
+
+    // What it throws comes out, and it uses other tracers, not this one.
+    CHECK_THROWS_AS(tracer.trace(model, rays, ColorDirection::kRay, true,
+                                 [](double) -> bool { throw std::out_of_range("of the watch"); }),
+                    std::out_of_range);
+    CHECK_THROWS_AS(tracer.backward(model, gradients), UsageError);
+    Tracer other(context, options);
+    const auto within = [&](double) {
+      CHECK_THROWS_AS(tracer.trace(model, rays), UsageError);
+      return other.trace(model, std::span(rays).first(10)).size() == 10;
+    };
+    CHECK(tracer.trace(model, rays, ColorDirection::kRay, false, within).size() == rays.size());
   }
 }
 

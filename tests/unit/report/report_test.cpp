@@ -5,9 +5,11 @@
 
 #include <chrono>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -141,6 +143,30 @@ TEST_CASE("a report of a run that is under way or damaged says so") {
   CHECK_THROWS_AS(run_report(run.path()), DataError);
   fs::remove(run.path() / "metrics.json");
   CHECK_THROWS_AS(run_report(run.path()), DataError);
+}
+
+TEST_CASE("a model or cameras that cannot be read are told in their place of a report") {
+  const Run run;
+  const fs::path folder = run.path() / "point_cloud/iteration_200";
+  fs::create_directories(folder);
+  Gaussians model;
+  model.resize(3);
+  write_ply(folder / "point_cloud.ply", model, {});
+  std::string bytes = read_bytes(folder / "point_cloud.ply");
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  std::memcpy(bytes.data() + bytes.size() - sizeof(none), &none, sizeof(none));
+  write_bytes(folder / "point_cloud.ply", bytes);
+  run.write("cameras.json", "[{");
+  run.write("exposures.json", "[]");
+  fs::remove(run.path() / "config.toml");
+  const std::string page = run_report(run.path());
+  CHECK(fault(page) == "");
+  for (const char* part : {"<h2>Model</h2>\n<p class=\"warn\">", "point_cloud.ply",
+                           "<h2>Cameras</h2>\n<p class=\"warn\">", "cameras.json",
+                           "<h2>Exposure</h2>\n<p class=\"warn\">", "exposures.json",
+                           "<p>There is no config.toml that tells them.</p>"})
+    CHECK_MESSAGE(contains(page, part), part);
+  CHECK(!contains(page, "All settings are the defaults"));
 }
 
 TEST_CASE("members of another type count as missing") {

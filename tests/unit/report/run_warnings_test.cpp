@@ -47,7 +47,7 @@ TEST_CASE("views that stand out, a full model and blurred photos are warned of")
   run.write("metrics.json", R"({"complete":true,"gaussians":140,"most_gaussians":141,
     "evaluations":[{"iteration":200,"psnr":20}]})");
   const std::string page = run_report(run.path());
-  CHECK(contains(page, "whose pose or photo may be wrong: 3_.png."));
+  CHECK(contains(page, "pose or photo may be wrong, or few photos show that part: 3_.png."));
   CHECK(contains(page, "Held-out photos less sharp than the others: 7_.png."));
   CHECK(!contains(page, "Training photos"));
   CHECK(contains(page, "<td>140, at most 141</td>"));
@@ -92,6 +92,8 @@ TEST_CASE("a run that has seen its photos a few times warns of those alone that 
   CHECK(is_odd(20, 200));
   CHECK_FALSE(is_odd(20, 199));
   CHECK(is_odd(10, 100));
+  // Of few photos each shows what no other does.
+  CHECK_FALSE(is_odd(15, 3000, 11));
   // Of many photos few steps for each make a model.
   CHECK(is_odd(20, 3000, 400));
   CHECK_FALSE(is_odd(20, 2999, 400));

@@ -4,6 +4,7 @@
 
 #include <doctest/doctest.h>
 
+#include <clocale>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -14,6 +15,7 @@
 
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "util/atomic_file.hpp"
 
 using namespace raysplats;
 
@@ -118,4 +120,31 @@ TEST_CASE("rows of an older metrics.csv stay when its run goes on") {
   CHECK(text ==
         "iteration,seconds,loss,psnr,gaussians,it_per_s,candidates,hits\n10,1.5,0.5,12,100,7,0,0\n"
         "20,3,0.4,13,100,7,0,0\n");
+}
+
+TEST_CASE("a run that starts leaves the files alone that others write into its folder") {
+  const TemporaryDirectory folder;
+  AtomicFile picture(folder / "turn.gif");
+  picture.write("frames");
+  const FileLock lock = RunFolder(folder.path()).lock();
+  picture.commit();
+  CHECK(read_bytes(folder / "turn.gif") == "frames");
+}
+
+TEST_CASE("columns of a run are read alike where decimals have a comma") {
+  const char* before = std::setlocale(LC_NUMERIC, nullptr);
+  const std::string usual = before == nullptr ? "C" : before;
+  if (std::setlocale(LC_NUMERIC, "de_DE.UTF-8") == nullptr) {
+    MESSAGE("the locale de_DE.UTF-8 is not installed");
+    return;
+  }
+  const TemporaryDirectory folder;
+  folder.write("metrics.csv", "iteration,seconds,loss,psnr\n10,7.25,0.5,20.75\n");
+  RunFolder run(folder.path());
+  run.begin_metrics(10);
+  std::setlocale(LC_NUMERIC, usual.c_str());
+  REQUIRE(run.former_rows().size() == 1);
+  CHECK(run.former_rows()[0].seconds == 7.25);
+  CHECK(run.former_rows()[0].loss == 0.5);
+  CHECK(run.former_rows()[0].psnr == 20.75);
 }

@@ -172,6 +172,18 @@ TEST_CASE("paths along photos lie where the photos do") {
     CHECK(std::abs(camera.center().y) < 0.501);
     CHECK(glm::transpose(camera.rotation)[2].z > 0.95);
   }
+  // Photos straight down whose ups cancel have none that a spiral could keep.
+  std::vector<Camera> downward;
+  for (int i = 0; i < 8; ++i) {
+    const glm::dvec3 eye(0.3 * (i / 2), -5, 0.2 * (i % 2));
+    downward.push_back(
+        look_at(eye, eye + glm::dvec3(0, 5, 0), {0, 0, i % 2 == 0 ? -1 : 1}, 64, 48, 50));
+  }
+  for (const Camera& camera : spiral_cameras(downward, 24)) {
+    CHECK(std::abs(camera.center().x - 0.45) < 0.46);
+    CHECK(glm::transpose(camera.rotation)[2].y > 0.95);
+    CHECK(glm::transpose(camera.rotation)[1].z > 0.95);  // as the first photo
+  }
   const auto steps = interpolated_cameras(forward, 4);
   REQUIRE(steps.size() == 33);
   for (std::size_t i = 0; i < forward.size(); ++i) {

@@ -130,5 +130,6 @@ TEST_CASE("camera: look_at takes up of any length, and refuses what gives no dir
     CHECK_THROWS_AS(look_at(eye, {0, odd, 0}, up, 10, 10, 10), UsageError);
     CHECK_THROWS_AS(look_at({odd, 0, 0}, {odd, 0, 0}, up, 10, 10, 10), UsageError);
     CHECK_THROWS_AS(look_at(eye, target, {0, 0, odd}, 10, 10, 10), UsageError);
+    CHECK_THROWS_AS(look_at(eye, target, up, 10, 10, odd), UsageError);
   }
 }

@@ -82,4 +82,8 @@ TEST_CASE("gaussians: what does not fit together is refused before it is changed
   model = numbered(1, 2);
   model.sh.pop_back();
   CHECK_THROWS_AS(changed(model, turn), UsageError);
+  CHECK_THROWS_AS(with_sh_degree(model, 1), UsageError);
+  model = numbered(1, 2);
+  model.sh_degree = 3;
+  CHECK_THROWS_AS(with_sh_degree(model, 2), UsageError);
 }

@@ -278,6 +278,22 @@ TEST_CASE("edges are open where no other triangle has both ends at the same posi
     moved.positions[0] += 1e-4f;
     CHECK(!open_edges(moved).empty());
   }
+  // Far from the origin only the size of the mesh counts, and the last digit that is left there.
+  for (const float offset : {1e3f, 5e5f}) {
+    CAPTURE(offset);
+    Mesh pane;
+    for (const float corner : {0.0f, 0.4f, 0.0f, 0.4f}) {
+      pane.positions.insert(pane.positions.end(),
+                            {offset + corner, pane.positions.size() < 6 ? 0.0f : 0.4f, 0.0f});
+    }
+    pane.triangles = {0, 1, 2, 2, 1, 3};
+    pane.materials = {0, 0};
+    CHECK(open_edges(pane) == Open{{0, 4}});
+    Mesh moved = body;
+    for (std::size_t i = 0; i < moved.positions.size(); i += 3) moved.positions[i] += offset;
+    moved.positions[0] = std::nextafter(moved.positions[0], 9e9f);
+    CHECK(open_edges(moved).empty());
+  }
   // A triangle without area opens nothing.
   body.triangles.insert(body.triangles.end(), {0, 0, 1});
   body.materials.push_back(7);

@@ -44,6 +44,23 @@ TEST_CASE("Morton order is a permutation that an outlier does not spoil") {
   CHECK(morton_order({}).empty());
 }
 
+TEST_CASE("Morton order is that of the codes, and of the indices where those are equal") {
+  for (const std::size_t count : {1u, 2u, 7u, 1000u}) {
+    std::vector<float> positions = normal_positions(count);
+    // Half of the points lie in places of others.
+    for (std::size_t k = 0; k < 3 * (count / 2); ++k) {
+      positions[k] = positions[positions.size() - 1 - k / 9 * 3 - k % 3];
+    }
+    const std::vector<std::uint64_t> codes = morton_codes(positions);
+    const std::vector<std::uint32_t> order = morton_order(positions);
+    REQUIRE(order.size() == count);
+    for (std::size_t i = 1; i < count; ++i) {
+      const std::uint32_t before = order[i - 1], now = order[i];
+      REQUIRE((codes[before] < codes[now] || (codes[before] == codes[now] && before < now)));
+    }
+  }
+}
+
 TEST_CASE("a model in Morton order holds the same Gaussians") {
   Gaussians model;
   model.sh_degree = 1;

@@ -8,12 +8,14 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trainer.hpp"
 #include "run/checkpoint.hpp"
+#include "run/train_config.hpp"
 #include "trace/device_gaussians.hpp"
 #include "unit/fixture.hpp"
 #include "unit/log_capture.hpp"
@@ -385,9 +387,8 @@ TEST_CASE("a run of cut-out photos that are taken for others is told how to go o
   REQUIRE(data.alpha_is_background);
   const auto resumed_at = [&](AlphaUse use, bool cut_out) {
     data.alpha_is_background = cut_out;
-    TrainOptions options = growing();
-    options.data.alpha = use;
-    Trainer trainer(shared_test_context(), data, options, place.run("run"));
+    data.read_as->alpha = use;
+    Trainer trainer(shared_test_context(), data, growing(), place.run("run"));
     trainer.resume("latest");
     return trainer.iteration();
   };
@@ -399,4 +400,48 @@ TEST_CASE("a run of cut-out photos that are taken for others is told how to go o
   CHECK_FALSE(log.contains(advice));
   CHECK(resumed_at(AlphaUse::kAuto, false) == kIterations);
   CHECK(log.contains(advice));
+}
+
+TEST_CASE("a run says how its data set was read, and options that say otherwise are refused") {
+  const Place place;
+  DatasetOptions halved;
+  halved.downscale = 2;
+  halved.masks = MaskUse::kCutout;
+  const Dataset data = load_dataset(place.folder / "data", halved);
+  TrainOptions options = growing();
+  const auto train = [&] {
+    Trainer(shared_test_context(), data, options, place.run("run"), true).run(false);
+    TrainOptions said;
+    read_train_config(place.run("run") / "config.toml", said);
+    return said;
+  };
+  const TrainOptions left_open = train();
+  CHECK(left_open.data.downscale == 2);
+  CHECK(left_open.data.masks == MaskUse::kCutout);
+  options.data = halved;
+  CHECK(train().data.downscale == 2);
+  options.data.downscale = 4;
+  CHECK(contains(message_of<UsageError>([&] { (void)train(); }),
+                 "say 'downscale' = 4, and its data set was read with 2: read it with the same"));
+}
+
+TEST_CASE("a run that does not say how its data set was read goes on, and is warned of") {
+  const Place place;
+  DatasetOptions smaller;
+  smaller.downscale = 2;
+  smaller.test_every = 4;
+  Dataset data = load_dataset(place.folder / "data", smaller);
+  const auto read_as = std::exchange(data.read_as, std::nullopt);
+  Trainer(shared_test_context(), data, growing(), place.run("run")).run(false);
+  const LogCapture log;
+  const auto resumed_at = [&] {
+    Trainer trainer(shared_test_context(), data, growing(), place.run("run"));
+    trainer.resume("latest");
+    return trainer.iteration();
+  };
+  CHECK(resumed_at() == kIterations);
+  CHECK_FALSE(log.contains("does not say how"));
+  data.read_as = read_as;
+  CHECK(resumed_at() == kIterations);
+  CHECK(log.contains("does not say how"));
 }

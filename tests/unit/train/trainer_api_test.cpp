@@ -1,8 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <spdlog/details/null_mutex.h>
+#include <spdlog/sinks/base_sink.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
 #include <cmath>
+#include <future>
+#include <memory>
 #include <stdexcept>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -55,6 +63,30 @@ struct Stop : std::runtime_error {
   Stop() : std::runtime_error("enough") {}
 };
 
+/// Hears which of the messages that contain `part` are logged while other threads have to wait for
+/// the context.
+class TurnSink : public spdlog::sinks::base_sink<spdlog::details::null_mutex> {
+ public:
+  TurnSink(const Context& context, std::string_view part) : context_(&context), part_(part) {}
+  std::vector<bool> waits;
+
+ private:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    if (std::string_view(message.payload.data(), message.payload.size()).find(part_) ==
+        std::string_view::npos)
+      return;
+    others_.push_back(
+        std::async(std::launch::async, [this] { const auto turn = context_->lock(); }));
+    waits.push_back(others_.back().wait_for(std::chrono::milliseconds(500)) ==
+                    std::future_status::timeout);
+  }
+  void flush_() override {}
+
+  const Context* context_;
+  std::string_view part_;
+  std::vector<std::future<void>> others_;  // wait until the log is over
+};
+
 }  // namespace
 
 TEST_CASE("steps of one's own train as a run does") {
@@ -90,6 +122,48 @@ TEST_CASE("steps of one's own train as a run does") {
   const EvaluationRow row = steps.evaluate();
   CHECK(row.views == 2);
   CHECK(row.psnr == doctest::Approx(summary.evaluations.back().psnr).epsilon(0.01));
+}
+
+TEST_CASE("a trainer takes its turn at the context while it is made") {
+  Photos photos;
+  auto turn = photos.context.lock();
+  auto made = std::async(std::launch::async, [&] {
+    const Trainer trainer(photos.context, photos.dataset, small_options(), photos.folder / "run");
+  });
+  CHECK(made.wait_for(std::chrono::seconds(2)) == std::future_status::timeout);
+  turn.unlock();
+  CHECK_NOTHROW(made.get());
+}
+
+TEST_CASE("a run takes its turn at the context for what follows its steps") {
+  Photos photos;
+  TrainOptions options = small_options();
+  options.trace.max_hits = 1;
+  Trainer trainer(photos.context, photos.dataset, options, photos.folder / "run");
+  const auto sink = std::make_shared<TurnSink>(photos.context, "--max-hits");
+  const auto before = spdlog::default_logger();
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>("turns", sink));
+  trainer.run(false);
+  spdlog::set_default_logger(before);
+  CHECK(sink->waits == std::vector<bool>{true, true});  // in the run, and at its end
+}
+
+TEST_CASE("a state is not taken back while the trainer trains") {
+  Photos photos;
+  Trainer trainer(photos.context, photos.dataset, small_options(), photos.folder / "run");
+  trainer.step(2);
+  trainer.save();
+  int calls = 0;
+  trainer.on_step([&](const TrainProgress&) {
+    if (++calls > 2) trainer.stop();
+    CHECK_THROWS_AS(trainer.resume("latest"), UsageError);
+  });
+  trainer.step(2);
+  CHECK(calls == 2);
+  CHECK(trainer.iteration() == 4);
+  trainer.on_step(nullptr);
+  trainer.resume("latest");
+  CHECK(trainer.iteration() == 2);
 }
 
 TEST_CASE("test photos are read once in a run where the budget has room for them") {

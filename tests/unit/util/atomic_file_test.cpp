@@ -16,6 +16,7 @@
 #include <string>
 
 #include "raysplats/error.hpp"
+#include "unit/no_rights.hpp"
 #include "unit/temporary_directory.hpp"
 #include "unit/text.hpp"
 
@@ -67,8 +68,23 @@ TEST_CASE("atomic file: two writers of one file have temporary files of their ow
   CHECK(read_bytes(target) == "the second");
   first.commit();
   CHECK(read_bytes(target) == "first");
-  AtomicFile left(target);
+}
+
+TEST_CASE("atomic file: what a killed process has left is removed, what one still writes is not") {
+  const TemporaryDirectory folder;
+  fs::path left;
+  {
+    const AtomicFile file(folder / "model.ply");
+    left = file.temporary();
+  }
+  write_bytes(left, "half");
+  AtomicFile living(folder / "picture.png");
+  living.write("pixels");
   CHECK(remove_stale_temporaries(folder.path()) == 1);
+  CHECK(!fs::exists(left));
+  living.commit();
+  CHECK(read_bytes(folder / "picture.png") == "pixels");
+  CHECK(remove_stale_temporaries(folder.path()) == 0);
 }
 
 TEST_CASE("atomic file: without commit nothing remains") {
@@ -113,7 +129,7 @@ TEST_CASE("atomic file: a name may be as long as names can be") {
     file.write("text");
     file.commit();
     CHECK(read_bytes(folder / name) == "text");
-    AtomicFile left(folder / name);
+    write_bytes(folder / temporary, "half");
     CHECK(remove_stale_temporaries(folder.path()) == 1);
   }
 }
@@ -147,6 +163,38 @@ TEST_CASE("atomic file: a folder that cannot be written names the path and the r
     CHECK(denied.find("Permission denied") != std::string::npos);
     fs::permissions(folder.path(), fs::perms::owner_all);
   }
+}
+
+TEST_CASE("atomic file: a folder that cannot be made names the system's reason") {
+  const TemporaryDirectory folder;
+  fs::permissions(folder.path(), static_cast<fs::perms>(0555));
+  std::string denied;
+  {
+    const NoRights none;
+    denied = data_error([&] { write_text_file(folder / "new/a.txt", "x"); });
+  }
+  fs::permissions(folder.path(), fs::perms::owner_all);
+  CHECK(denied.find("a.txt cannot be created: Permission denied") != std::string::npos);
+}
+
+TEST_CASE("atomic file: who may read a file stays, and is asked of umask for a new one") {
+  const TemporaryDirectory folder;
+  const auto mode = [&](const char* name) {
+    return static_cast<unsigned>(fs::status(folder / name).permissions());
+  };
+  const mode_t before = ::umask(0027);
+  write_text_file(folder / "new", "x");
+  CHECK(mode("new") == 0640);
+  for (const unsigned kept : {0600u, 0444u, 0664u}) {
+    fs::permissions(folder / "new", static_cast<fs::perms>(kept));
+    AtomicFile file(folder / "new");
+    const auto meanwhile = static_cast<unsigned>(fs::status(file.temporary()).permissions());
+    CHECK((meanwhile & ~kept & 0077) == 0);
+    CHECK((meanwhile & 0600) == 0600);
+    file.commit();
+    CHECK(mode("new") == kept);
+  }
+  ::umask(before);
 }
 
 TEST_CASE("atomic file: a full disk keeps the old file and leaves no temporary one") {

@@ -60,7 +60,8 @@ TEST_CASE("words that belong to a list of numbers are told from others") {
     INFO(word);
     CHECK(is_number_list_part(word));
   }
-  for (const char* word : {"", "data", "-o", "--eval-at", "-q", "5x", "e5", "runs/5", "-", "."}) {
+  for (const char* word : {"", "data", "-o", "--eval-at", "-q", "5x", "e5", "runs/5", "-", ".",
+                           "2024-05-01", "1.2.3", "4:"}) {
     INFO(word);
     CHECK_FALSE(is_number_list_part(word));
   }

@@ -30,7 +30,9 @@ TEST_CASE("checking an output folder makes nothing") {
 TEST_CASE("an output folder that cannot be is refused alike, beforehand and when it is made") {
   const TemporaryDirectory folder;
   folder.write("file", "in the way");
-  for (const std::filesystem::path& path : {folder / "file", folder / "file/below"}) {
+  const std::string longest(300, 'x');
+  for (const std::filesystem::path& path :
+       {folder / "file", folder / "file/below", folder / longest, folder / "new" / longest}) {
     CAPTURE(path.string());
     const std::string early = data_error([&] { check_output_directory(path); });
     CHECK(early.find("cannot be created") != std::string::npos);

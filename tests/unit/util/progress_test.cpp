@@ -4,10 +4,13 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <memory>
+#include <optional>
+#include <utility>
 
 #include "util/interrupt.hpp"
 
@@ -18,6 +21,7 @@ TEST_CASE("durations read as a clock") {
   CHECK(format_duration(65.4) == "1:05");
   CHECK(format_duration(7384) == "2:03:04");
   CHECK(format_duration(-3) == "0:00");
+  CHECK(format_duration(1e300) == format_duration(1e12));
 }
 
 TEST_CASE("the progress line fits its width and shows the state") {
@@ -54,6 +58,37 @@ TEST_CASE("a terminal of 80 columns shows the time left beside all that a traini
   progress.update(1234, "loss 0.0213, PSNR 25.31 of this view, 123456 Gaussians");
   CHECK(progress.line(79).size() <= 79);
   CHECK(progress.line(79).find(" left") != std::string::npos);
+}
+
+namespace {
+
+std::chrono::steady_clock::time_point moment;
+
+}  // namespace
+
+TEST_CASE("steps that last long, and tell of it meanwhile, are counted over all of their time") {
+  Progress progress("Frames", 10, 0, nullptr, [] { return moment; });
+  const auto step = [&](std::int64_t done) {
+    for (int i = 0; i < 60; ++i) {
+      moment += std::chrono::milliseconds(500);
+      progress.update(done, "within a frame");
+    }
+    progress.update(done + 1, "");
+  };
+  step(0);
+  CHECK(progress.rate() == doctest::Approx(1.0 / 30));
+  CHECK(progress.line(120).find(" 1/10, 4:30 left") != std::string::npos);
+  for (int i = 1; i < 4; ++i) step(i);
+  CHECK(progress.rate() == doctest::Approx(1.0 / 30));
+}
+
+TEST_CASE("a first step that was short does not count as much as a long one behind it") {
+  Progress progress("Frames", 10, 0, nullptr, [] { return moment; });
+  moment += std::chrono::milliseconds(10);
+  progress.update(1, "");
+  moment += std::chrono::seconds(10);
+  progress.update(2, "");
+  CHECK(progress.rate() == doctest::Approx(0.2).epsilon(0.2));
 }
 
 TEST_CASE("work that turns out to be longer has another end in its progress") {
@@ -94,6 +129,26 @@ TEST_CASE("an interrupt is noted while a guard lives") {
   CHECK(!fresh.requested());
   std::raise(SIGTERM);
   CHECK(fresh.requested());
+}
+
+TEST_CASE(
+    "a guard hears signals after an older one has gone, and the last one puts back what was") {
+  const auto handler = [] {
+    struct sigaction present {};
+    sigaction(SIGINT, nullptr, &present);
+    return present.sa_handler;
+  };
+  const auto before = handler();
+  {
+    std::optional<InterruptGuard> first(std::in_place);
+    const auto marks = handler();
+    const InterruptGuard second;
+    first.reset();
+    REQUIRE((handler() == marks));
+    std::raise(SIGINT);
+    CHECK(second.requested());
+  }
+  CHECK((handler() == before));
 }
 
 TEST_CASE("a terminal that goes is an interrupt too, however often it says so, but not for nohup") {
