@@ -84,7 +84,8 @@ std::vector<std::string> command_names(const CLI::App& app) {
 
 /// Where a list of any length may have taken the file or folder that is missing: says so.
 std::string taken_as_number(const CLI::App& command, const CLI::ParseError& error) {
-  if (error.get_name() != "RequiredError" || std::string_view(error.what()).starts_with("--"))
+  // What is written is named by its option alone.
+  if (error.get_name() != "RequiredError" || std::string_view(error.what()).starts_with("--output"))
     return "";
   for (const CLI::Option* option : command.get_options()) {
     for (const std::string& words : option->results()) {

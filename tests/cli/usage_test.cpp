@@ -106,6 +106,9 @@ TEST_CASE("a list takes no word that is called like a number") {
   // What may be either is a number.
   check_refused(train + Words{"--save-at", "5", "7"}, 2,
                 "7 is taken for a number of --save-at: write ./7 for a file or folder");
+  const Outcome unnamed = raysplats_program({"train", "data", "--save-at", "5", "7"});
+  CHECK(contains(unnamed.err, "--output is required"));
+  CHECK_FALSE(contains(unnamed.err, "is taken for"));
 }
 
 TEST_CASE("without a folder for caches there is none to clear") {
