@@ -56,9 +56,9 @@ struct PictureBudget {
 // How the data set was read, which options may leave to it. Throws UsageError where they say
 // something else: the run would be evaluated on other pictures than it was trained on.
 DatasetOptions data_options(DatasetOptions said, const Dataset& dataset) {
-  if (!dataset.read_as) return said;
-  DatasetOptions read = *dataset.read_as, usual;
+  DatasetOptions read = dataset.read_as.value_or(said), usual;
   read.origin = dataset.origin;
+  if (!dataset.read_as) return read;
   const std::vector<OptionRow> of_said = data_option_rows(said);
   const std::vector<OptionRow> of_read = data_option_rows(read);
   const std::vector<OptionRow> of_usual = data_option_rows(usual);
@@ -131,7 +131,6 @@ Trainer::Impl::Impl(Context& device,
         "'views-per-step' = {} leaves some without one: give at least as many views as ranks",
         ranks.size(), slots.size()));
   }
-  options.data.origin = dataset.origin;
   apply_options();
   if (options.strategy == DensityStrategy::kMcmc)
     mcmc.emplace(device, options, subject_length(train_cameras, dataset.points, extent));

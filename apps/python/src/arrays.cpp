@@ -106,9 +106,7 @@ Numbers<T> checked(const nb::object& given, const char* name, const Shape& shape
     throw UsageError(fmt::format("{} has the shape {}, but {} is needed", name, shape_text(lengths),
                                  shape_text(shape)));
   }
-  if (!is_contiguous(array)) {
-    fail_not_contiguous(name);
-  }
+  if (!is_contiguous(array)) fail_not_contiguous(name);
   const auto* data = static_cast<const T*>(array.data());
   const std::span<const T> values(data, array.size());
   return {values, std::move(lengths), std::move(array)};
