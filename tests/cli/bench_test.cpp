@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "../skip_test.hpp"
+#include "build_paths.hpp"
 #include "program.hpp"
 
 namespace {
@@ -158,7 +159,7 @@ TEST_CASE("the file for the owner of a device to send is written whatever fails"
 
 TEST_CASE("bench compares two folders of kernels") {
   const TemporaryFolder folder;
-  const std::string kernels = std::string(RAYSPLATS_SOURCE_DIR) + "/cl";
+  const std::string kernels = raysplats::test::source_dir() + "/cl";
   const std::vector<std::string> both{"bench", "--kernels", kernels, "--against", kernels};
   const Outcome outcome =
       raysplats_program(with(both, {"--sizes", "1k", "--resolution", "32x32", "--repeat", "2",

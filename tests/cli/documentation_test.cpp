@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "build_paths.hpp"
 #include "program.hpp"
 
 namespace fs = std::filesystem;
@@ -188,7 +189,8 @@ class Place {
                R"({"w":16,"h":16,"fl_x":16,"fl_y":16,"cx":8,"cy":8,"frames":[
                  {"transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,6],[0,0,0,1]]}]})");
     write_npy(folder_ / "rays.npy", "False", "(2, 6)", {0, 0, -6, 0, 0, 1, 1, 0, -6, 0, 0, 1});
-    fs::create_directory_symlink(fs::path(RAYSPLATS_SOURCE_DIR) / "configs", folder_ / "configs");
+    fs::create_directory_symlink(fs::path(raysplats::test::source_dir()) / "configs",
+                                 folder_ / "configs");
     for (const char* name : {"garden", "lego"}) train(name);
     run({"bench", "--sizes", "1k", "--resolution", "16x16", "--repeat", "1", "--filter", "^adam",
          "--json", "a.json"});
@@ -248,7 +250,7 @@ class Place {
       // Folders of kernels that a reader has.
       for (std::size_t i = 1; i < words.size(); ++i) {
         if (words[i - 1] == "--kernels" || words[i - 1] == "--against")
-          words[i] = std::string(RAYSPLATS_SOURCE_DIR) + "/cl";
+          words[i] = raysplats::test::source_dir() + "/cl";
         if (words[i - 1] == "--sizes") words[i] = std::string("1k");
       }
       add("--sizes", "1k");
@@ -299,8 +301,9 @@ void run_command(const Place& place, const Words& words, std::set<Words>& measur
 
 TEST_CASE("every command and TOML block of the documents is run") {
   const Place place;
-  std::vector<fs::path> documents{fs::path(RAYSPLATS_SOURCE_DIR) / "README.md"};
-  for (const auto& entry : fs::directory_iterator(fs::path(RAYSPLATS_SOURCE_DIR) / "docs")) {
+  std::vector<fs::path> documents{fs::path(raysplats::test::source_dir()) / "README.md"};
+  for (const auto& entry :
+       fs::directory_iterator(fs::path(raysplats::test::source_dir()) / "docs")) {
     if (entry.path().extension() == ".md") documents.push_back(entry.path());
   }
   std::sort(documents.begin() + 1, documents.end());

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "build_paths.hpp"
 #include "program.hpp"
 
 namespace {
@@ -23,7 +24,7 @@ std::string trimmed(const std::string& text) {
 }  // namespace
 
 TEST_CASE("docs/cli.md lists what --help-all lists") {
-  const std::string page = read_file(std::string(RAYSPLATS_SOURCE_DIR) + "/docs/cli.md");
+  const std::string page = read_file(raysplats::test::source_dir() + "/docs/cli.md");
   for (const std::vector<std::string>& command : {std::vector<std::string>{"devices"},
                                                   {"doctor"},
                                                   {"generate"},

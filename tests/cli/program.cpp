@@ -18,6 +18,8 @@
 #include <system_error>
 #include <utility>
 
+#include "build_paths.hpp"
+
 namespace fs = std::filesystem;
 
 RunningProgram::RunningProgram(const std::vector<std::string>& arguments,
@@ -25,7 +27,7 @@ RunningProgram::RunningProgram(const std::vector<std::string>& arguments,
   const std::string out = surroundings.out_file.empty() ? folder_ / "out" : surroundings.out_file;
   const std::string err = surroundings.err_file.empty() ? folder_ / "err" : surroundings.err_file;
   std::vector<std::string> words = surroundings.launcher;
-  words.emplace_back(RAYSPLATS_PROGRAM);
+  words.emplace_back(raysplats::test::program_file());
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());

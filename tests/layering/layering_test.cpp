@@ -13,6 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "build_paths.hpp"
+
 namespace fs = std::filesystem;
 
 // Of consumer.cpp: the headers that whoever links the library can include.
@@ -52,7 +54,7 @@ Modules read_modules(const fs::path& root) {
   return out;
 }
 
-const Modules kModules = read_modules(RAYSPLATS_SOURCE_DIR);
+const Modules kModules = read_modules(raysplats::test::source_dir());
 const std::map<std::string, Names>& kBelow = kModules.below;
 
 /// The module that a public header is the face of.
@@ -248,7 +250,7 @@ TEST_CASE("the order of the modules is read from the build") {
 }
 
 TEST_CASE("dependencies point one way, and public headers include public headers") {
-  const fs::path root = RAYSPLATS_SOURCE_DIR;
+  const fs::path root = raysplats::test::source_dir();
   REQUIRE(sources(root / "host").size() > 100);
   REQUIRE(sources(root / "cl").size() > 80);
   REQUIRE(sources(root / "tests/unit").size() > 150);

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "../skip_test.hpp"
+#include "build_paths.hpp"
 #include "ranks.hpp"
 #include "run/checkpoint.hpp"
 #include "tiny_run.hpp"
@@ -205,7 +206,7 @@ MPI_TEST_CASE("the time of a run is the same for all processes") {
 MPI_TEST_CASE("processes with other options or data than the first do not train") {
   const TemporaryFolder folder;
   const std::string run = folder / "run";
-  const Words other{":", "-n", "1", RAYSPLATS_PROGRAM};
+  const Words other{":", "-n", "1", raysplats::test::program_file()};
   const Outcome outcome = raysplats_program(
       shared_training(run) + other + shared_training(run) + Words{"--seed", "43"}, mpirun(1));
   INFO(outcome.err);

@@ -17,6 +17,7 @@
 #include "bench/cards.hpp"
 #include "bench/kernel_folders.hpp"
 #include "bench/scene_bench.hpp"
+#include "build_paths.hpp"
 #include "device/fault_injection.hpp"
 #include "raysplats/error.hpp"
 #include "synth/bench_scenes.hpp"
@@ -105,7 +106,7 @@ TEST_CASE("a device's report is made where the self-test fails, of whatever byte
 }
 
 TEST_CASE("rows that yield more than two folders of kernels are compared by are named") {
-  const std::string kernels = (std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "cl").string();
+  const std::string kernels = (std::filesystem::path(test::source_dir()) / "cl").string();
   BenchOptions options = tiny_bench(1);
   options.filter = "^(adam|densify|loss-gradient|loss-value|rays|view)/";
   options.repeat = 1;
@@ -129,7 +130,7 @@ TEST_CASE("what is no number in a result of two folders of kernels stays the lar
 
 TEST_CASE("two folders of kernels are compared by what they compute, then by time in turns") {
   const TemporaryDirectory folder;
-  const std::filesystem::path own = std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "cl";
+  const std::filesystem::path own = std::filesystem::path(test::source_dir()) / "cl";
   const std::filesystem::path changed = folder.path() / "cl";
   std::filesystem::copy(own, changed, std::filesystem::copy_options::recursive);
   BenchOptions options = tiny_bench(1);

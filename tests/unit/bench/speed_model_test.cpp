@@ -12,6 +12,7 @@
 #include "bench/executed_work.hpp"
 #include "bench/forecast.hpp"
 #include "bench/scene_bench.hpp"
+#include "build_paths.hpp"
 #include "raysplats/error.hpp"
 #include "synth/bench_scenes.hpp"
 #include "trace/camera_tracer.hpp"
@@ -96,7 +97,7 @@ TEST_CASE("the model of speed lets the other processors come late to every launc
 }
 
 TEST_CASE("the model's registers and local memory are those of the compilers' baseline") {
-  std::ifstream file(std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "scripts/gpu/baseline.json");
+  std::ifstream file(std::filesystem::path(test::source_dir()) / "scripts/gpu/baseline.json");
   const nlohmann::json baseline = nlohmann::json::parse(file);
   for (const CompiledKernel& kernel : compiled_kernels()) {
     CAPTURE(kernel.target);

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "build_paths.hpp"
 #include "device/buffer.hpp"
 #include "device/context.hpp"
 #include "device/program_cache.hpp"
@@ -118,7 +119,7 @@ TEST_CASE("programs: processes compile them where a compiler is named") {
   Folder folder;
   const fs::path log = folder.path() / "log";
   folder.options.compiler = folder.script(
-      fmt::format("echo \"$@\" >> '{}'\nexec '{}' \"$@\"", log.string(), RAYSPLATS_PROGRAM));
+      fmt::format("echo \"$@\" >> '{}'\nexec '{}' \"$@\"", log.string(), test::program_file()));
   {
     Context context(test_device(), folder.options);
     std::vector<Kernel> kernels = scales(context);

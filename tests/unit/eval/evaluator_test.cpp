@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "build_paths.hpp"
 #include "comm/thread_ranks.hpp"
 #include "eval/metrics.hpp"
 #include "raysplats/error.hpp"
@@ -354,7 +355,7 @@ TEST_CASE("evaluator: limits, early stop, LPIPS and refusals") {
                       std::filesystem::directory_iterator()) == 2);
 
   if (Lpips::available()) {
-    Lpips lpips(std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "tests/data/tiny_lpips.onnx");
+    Lpips lpips(std::filesystem::path(test::source_dir()) / "tests/data/tiny_lpips.onnx");
     options = {};
     options.lpips = &lpips;
     report = evaluate(render, scene.dataset, Split::kTrain, kBackground, {}, options);

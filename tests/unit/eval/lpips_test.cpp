@@ -7,6 +7,7 @@
 #include <fstream>
 #include <string>
 
+#include "build_paths.hpp"
 #include "raysplats/error.hpp"
 #include "skip_test.hpp"
 #include "unit/temporary_directory.hpp"
@@ -34,7 +35,7 @@ namespace {
 //                     numpy_helper.from_array(np.full((1, 3, 1, 1), 1 / 3, np.float32), "l")])
 //   m = h.make_model(g, opset_imports=[h.make_opsetid("", 11)]); m.ir_version = 7
 //   onnx.checker.check_model(m); onnx.save(m, "tiny_lpips.onnx")
-const std::filesystem::path kData = std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "tests/data";
+const std::filesystem::path kData = std::filesystem::path(test::source_dir()) / "tests/data";
 const std::filesystem::path kNetwork = kData / "tiny_lpips.onnx";
 
 // Those beside it have what OpenCV gets wrong of LPIPS as its package is: both pictures divided by

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "build_paths.hpp"
 #include "raysplats/error.hpp"
 #include "run/checkpoint.hpp"
 #include "run/train_option_table.hpp"
@@ -74,7 +75,7 @@ TEST_CASE("the configuration written is the configuration read") {
 }
 
 TEST_CASE("the configurations of the project are valid and the default one documents every key") {
-  const std::filesystem::path folder = std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "configs";
+  const std::filesystem::path folder = std::filesystem::path(test::source_dir()) / "configs";
   TrainOptions defaults;
   TrainOptions read;
   read.iterations = 1;

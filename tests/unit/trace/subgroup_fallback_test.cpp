@@ -10,6 +10,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "build_paths.hpp"
 #include "raysplats/error.hpp"
 #include "skip_test.hpp"
 #include "unit/temporary_directory.hpp"
@@ -45,7 +46,7 @@ class SeveralSubgroups {
     if (!device_.has_subgroups) {
       namespace fs = std::filesystem;
       const fs::path kernels = folder_.path() / "cl";
-      fs::copy(fs::path(RAYSPLATS_SOURCE_DIR) / "cl", kernels, fs::copy_options::recursive);
+      fs::copy(fs::path(test::source_dir()) / "cl", kernels, fs::copy_options::recursive);
       std::ifstream file(kernels / "trace/group.h");
       const std::string text{std::istreambuf_iterator<char>(file), {}};
       file.close();

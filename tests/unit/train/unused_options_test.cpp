@@ -5,6 +5,7 @@
 
 #include <filesystem>
 
+#include "build_paths.hpp"
 #include "run/train_config.hpp"
 #include "unit/temporary_directory.hpp"
 
@@ -60,8 +61,8 @@ TEST_CASE("what a run chose of its options is none that it does not read") {
 
 TEST_CASE("configurations that come with the program have none that they do not read") {
   int files = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(
-           std::filesystem::path(RAYSPLATS_SOURCE_DIR) / "configs")) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::filesystem::path(test::source_dir()) / "configs")) {
     if (entry.path().extension() != ".toml") continue;
     CAPTURE(entry.path());
     TrainOptions options;
