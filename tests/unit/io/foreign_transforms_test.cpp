@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "raysplats/dataset.hpp"
-#include "raysplats/io.hpp"
-#include "unit/io/data_sets.hpp"
+#include "unit/io/transforms_fixture.hpp"
 #include "unit/log_capture.hpp"
 
 using namespace raysplats;
@@ -18,22 +17,8 @@ using namespace raysplats::test;
 
 namespace {
 
-std::string file_of(const std::string& keys, const std::string& frames) {
-  return fmt::format("{{{}\"frames\": [{}]}}", keys, frames);
-}
-
 std::string frame_with(const std::string& matrix, const std::string& more = "") {
   return fmt::format("{{\"file_path\": \"a\", {}\"transform_matrix\": {}}}", more, matrix);
-}
-
-std::vector<Camera> cameras_of(const std::string& json) {
-  const Scratch scratch;
-  write_bytes(scratch / "cameras.json", json);
-  return read_cameras(scratch / "cameras.json");
-}
-
-std::string cameras_error(const std::string& json) {
-  return data_error([&] { cameras_of(json); });
 }
 
 const std::string kKeys = "\"w\": 40, \"h\": 30, \"fl_x\": 50, ";
