@@ -9,6 +9,7 @@
 #include "device/program_cache.hpp"
 #include "device/tuning.hpp"
 #include "raysplats/error.hpp"
+#include "util/json_text.hpp"
 #include "value_text.hpp"
 
 namespace raysplats::cli {
@@ -56,9 +57,7 @@ void run(const Options& options) {
   if (options.json) {
     nlohmann::ordered_json list = nlohmann::ordered_json::array();
     for (const DeviceInfo& device : devices) list.push_back(device_json(device));
-    // Drivers call devices by any bytes.
-    using Json = nlohmann::ordered_json;
-    fmt::print("{}\n", Json{{"devices", list}}.dump(2, ' ', false, Json::error_handler_t::replace));
+    fmt::print("{}\n", json_text(nlohmann::ordered_json{{"devices", list}}, 2));
   } else {
     for (const DeviceInfo& device : devices) print(device);
   }

@@ -17,13 +17,13 @@
 #include "info_scene.hpp"
 #include "io/colmap_model.hpp"
 #include "io/dataset_advice.hpp"
-#include "io/json_file.hpp"
 #include "io/model_file.hpp"
 #include "io/scene_file.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "run/model_source.hpp"
 #include "util/file_kind.hpp"
+#include "util/json_text.hpp"
 
 namespace raysplats::cli {
 namespace {
@@ -36,7 +36,8 @@ struct Options {
   DataSettings data;
 };
 
-void print_json(const Json& json) { fmt::print("{}\n", io::json_text(json, 2)); }
+/// Keys in alphabetical order.
+void print_json(const nlohmann::json& json) { fmt::print("{}\n", json_text(json, 2)); }
 
 /// A folder that is neither a run nor a data set may hold models.
 void check_folder(const std::filesystem::path& folder) {

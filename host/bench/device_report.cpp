@@ -12,6 +12,7 @@
 #include "bench/kept_failure.hpp"
 #include "bench/scene_bench.hpp"
 #include "device/device_json.hpp"
+#include "util/json_text.hpp"
 
 namespace raysplats {
 namespace {
@@ -241,7 +242,7 @@ std::string device_report_json(const DeviceReport& report) {
                                    {"seconds", report.seconds},
                                    {"runs", runs}};
   // Errors hold what drivers say, which may be any bytes.
-  return out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return json_text(out, 2) + "\n";
 }
 
 }  // namespace raysplats

@@ -11,6 +11,7 @@
 
 #include "device/context.hpp"
 #include "device/device_json.hpp"
+#include "util/json_text.hpp"
 #include "util/memory_limit.hpp"
 #include "util/number_text.hpp"
 
@@ -230,7 +231,7 @@ std::string diagnosis_json(const Diagnosis& diagnosis) {
                  {"devices", devices},
                  {"works", diagnosis.any_works()},
                  {"advice", diagnosis.advice}};
-  return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return json_text(out, 2) + "\n";
 }
 
 }  // namespace raysplats

@@ -9,6 +9,7 @@
 #include "bench/report.hpp"
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"
+#include "util/json_text.hpp"
 
 namespace raysplats {
 namespace {
@@ -103,7 +104,7 @@ std::string bench_json(const BenchReport& report) {
       {"peak_device_bytes", report.peak_device_bytes},
       {"rows", rows}};
   // Drivers' names and a model's file name may be any bytes.
-  return out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return json_text(out, 2) + "\n";
 }
 
 BenchReport read_bench_report(const std::filesystem::path& path) {

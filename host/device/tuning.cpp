@@ -13,6 +13,7 @@
 #include "device/program_cache.hpp"
 #include "raysplats/error.hpp"
 #include "util/atomic_file.hpp"
+#include "util/json_text.hpp"
 
 namespace raysplats {
 namespace {
@@ -31,8 +32,7 @@ using Entry = TuningStore::Entry;
 // What a driver says, as the file can hold it: what is no UTF-8 in it becomes U+FFFD.
 std::string storable(const std::string& said) {
   using Json = nlohmann::json;
-  const std::string text = Json(said).dump(-1, ' ', false, Json::error_handler_t::replace);
-  return Json::parse(text).get<std::string>();
+  return Json::parse(json_text(Json(said))).get<std::string>();
 }
 
 Entry entry_of(const DeviceInfo& device, const DeviceTuning& tuning) {

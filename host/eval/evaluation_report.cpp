@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "io/json_file.hpp"
 #include "raysplats/evaluation.hpp"
+#include "util/json_text.hpp"
 
 namespace raysplats {
 namespace {
@@ -51,7 +51,7 @@ std::string EvaluationReport::json() const {
   nlohmann::json json = to_json(mean);
   json["images"] = nlohmann::json::array();
   for (const EvaluationMetrics& image : images) json["images"].push_back(to_json(image));
-  return io::json_text(json, 2) + "\n";
+  return json_text(json, 2) + "\n";
 }
 
 }  // namespace raysplats

@@ -12,7 +12,6 @@
 #include "io/camera_model_names.hpp"
 #include "io/find_image.hpp"
 #include "io/image_file.hpp"
-#include "io/json_file.hpp"
 #include "io/transforms.hpp"
 #include "io/transforms_camera.hpp"
 #include "raysplats/error.hpp"
@@ -21,6 +20,7 @@
 #include "scene/camera_model.hpp"
 #include "scene/photo_lens.hpp"
 #include "util/atomic_file.hpp"
+#include "util/json_text.hpp"
 
 namespace raysplats {
 
@@ -96,7 +96,7 @@ void write_cameras(const std::filesystem::path& path, const std::vector<Camera>&
     frame["transform_matrix"] = std::move(matrix);
     root["frames"].push_back(std::move(frame));
   }
-  write_text_file(path, io::json_text(root, 1) + "\n");
+  write_text_file(path, json_text(root, 1) + "\n");
 }
 
 }  // namespace raysplats

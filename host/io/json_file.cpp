@@ -32,10 +32,6 @@ std::string place_of(std::string_view text, std::size_t byte) {
 
 }  // namespace
 
-std::string json_text(const nlohmann::json& json, int indent) {
-  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
 nlohmann::json read_json_object(const std::filesystem::path& path) {
   return parse_json_object(read_file(path, kMaxBytes), path);
 }

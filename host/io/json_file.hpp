@@ -9,10 +9,6 @@
 
 namespace raysplats::io {
 
-/// The text of a file that is written. Names of files and words of command lines are any bytes:
-/// what is no UTF-8 in them becomes U+FFFD. `indent`: as of nlohmann::json::dump().
-std::string json_text(const nlohmann::json& json, int indent = -1);
-
 constexpr int kMaxJsonDepth = 32;
 
 /// Parses a JSON file whose root is an object, of bounded size and depth. Throws DataError with the

@@ -11,11 +11,11 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/gaussians.hpp"
 #include "util/atomic_file.hpp"
 #include "util/file_kind.hpp"
+#include "util/json_text.hpp"
 
 namespace raysplats {
 namespace {
@@ -189,7 +189,7 @@ void write_checkpoint(const std::filesystem::path& path, const Checkpoint& check
 void write_checkpoint(const std::filesystem::path& path,
                       const Checkpoint& checkpoint,
                       const CheckpointSections& sections) {
-  const std::string header = io::json_text(header_of(checkpoint));
+  const std::string header = json_text(header_of(checkpoint));
   const Preamble preamble{kMagic, kVersion, static_cast<std::uint32_t>(sections.size()),
                           header.size(), hash(header.data(), header.size())};
   std::vector<SectionEntry> table(sections.size());

@@ -16,13 +16,13 @@
 
 #include "io/data_origin.hpp"
 #include "io/file_hash.hpp"
-#include "io/json_file.hpp"
 #include "io/model_formats.hpp"
 #include "io/transforms_camera.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "run/train_config.hpp"
 #include "util/atomic_file.hpp"
+#include "util/json_text.hpp"
 #include "util/number_text.hpp"
 #include "util/output_directory.hpp"
 
@@ -136,7 +136,7 @@ void RunFolder::write_cameras(std::span<const Camera> cameras) const {
     entry.update(io::lens_keys(camera));
     list.push_back(std::move(entry));
   }
-  write_text_file(path_ / "cameras.json", io::json_text(list) + "\n");
+  write_text_file(path_ / "cameras.json", json_text(list) + "\n");
 }
 
 void RunFolder::write_exposures(std::span<const Camera> cameras,
@@ -153,7 +153,7 @@ void RunFolder::write_exposures(std::span<const Camera> cameras,
     }
     json[cameras[i].name] = std::move(rows);
   }
-  write_text_file(path_ / "exposures.json", io::json_text(json, 1) + "\n");
+  write_text_file(path_ / "exposures.json", json_text(json, 1) + "\n");
 }
 
 void RunFolder::write_refined_cameras(std::vector<Camera> cameras,

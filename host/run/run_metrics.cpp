@@ -15,10 +15,10 @@
 #include <string>
 #include <string_view>
 
-#include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "run/run_folder.hpp"
 #include "util/atomic_file.hpp"
+#include "util/json_text.hpp"
 
 namespace raysplats {
 namespace {
@@ -147,7 +147,7 @@ void RunFolder::write_metrics(const nlohmann::json& summary) const {
     for (const EvaluationRow& row : validations_) json["validations"].push_back(to_json(row));
   }
   json["note"] = "training_seconds exclude evaluation and compiling kernels";
-  write_text_file(path_ / "metrics.json", io::json_text(json, 2) + "\n");
+  write_text_file(path_ / "metrics.json", json_text(json, 2) + "\n");
 }
 
 double judged_psnr(const EvaluationRow& row, bool exposures) {

@@ -4,11 +4,11 @@
 
 #include <nlohmann/json.hpp>
 
-#include "io/json_file.hpp"
 #include "raysplats/io.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
 #include "util/atomic_file.hpp"
+#include "util/json_text.hpp"
 
 namespace raysplats {
 
@@ -65,7 +65,7 @@ void Trainer::Impl::write_dump() {
       {"world_to_camera", rotation},
       {"translation", {camera.translation[0], camera.translation[1], camera.translation[2]}},
       {"refused_gradients", skipped_before + adam.skipped()}};
-  write_text_file(folder / "step.json", io::json_text(json, 2) + "\n");
+  write_text_file(folder / "step.json", json_text(json, 2) + "\n");
   write_state(folder / "state.rsck");
 }
 

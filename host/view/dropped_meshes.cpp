@@ -13,10 +13,10 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "io/json_file.hpp"
 #include "io/scene_file.hpp"
 #include "raysplats/error.hpp"
 #include "scene/mesh.hpp"
+#include "util/json_text.hpp"
 
 namespace raysplats::view {
 namespace {
@@ -54,7 +54,7 @@ std::string material_text(const Material& material) {
 
 std::string quoted(const std::string& text) {
   // What JSON escapes, TOML escapes alike, but for this.
-  std::string out = io::json_text(Json(text));
+  std::string out = json_text(Json(text));
   for (std::size_t at; (at = out.find('\x7f')) != std::string::npos;) out.replace(at, 1, "\\u007f");
   return out;
 }
@@ -180,7 +180,7 @@ std::string DroppedMeshes::json() const {
                     {"rotate", vector_json(each.placement.rotate)},
                     {"size", each.placement.size}});
   }
-  return io::json_text({{"type", "meshes"}, {"meshes", list}});
+  return json_text(nlohmann::json{{"type", "meshes"}, {"meshes", list}});
 }
 
 std::string DroppedMeshes::scene_text(const Camera& camera) const {

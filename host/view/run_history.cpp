@@ -4,7 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "io/json_file.hpp"
+#include "util/json_text.hpp"
 
 namespace raysplats::view {
 namespace {
@@ -75,7 +75,7 @@ std::string RunHistory::json() const {
                   {"rows", rows},
                   {"tests", tests},
                   {"left", left}};
-  return io::json_text(json);
+  return json_text(json);
 }
 
 }  // namespace raysplats::view

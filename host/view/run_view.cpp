@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "io/json_file.hpp"
+#include "util/json_text.hpp"
 
 namespace raysplats::view {
 namespace {
@@ -36,7 +36,7 @@ std::vector<std::string> RunView::urls() const { return viewer_.urls(); }
 
 void RunView::finish(const std::string& text) {
   history_.finish(text);
-  viewer_.tell_last(io::json_text({{"type", "run"}, {"ended", text}}));
+  viewer_.tell_last(json_text(nlohmann::json{{"type", "run"}, {"ended", text}}));
 }
 
 void RunView::noted(const TrainRow& row) { history_.add(row); }

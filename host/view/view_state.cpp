@@ -9,7 +9,7 @@
 #include <numbers>
 #include <vector>
 
-#include "io/json_file.hpp"
+#include "util/json_text.hpp"
 
 namespace raysplats::view {
 namespace {
@@ -115,7 +115,7 @@ std::string state_json(const ViewState& state) {
                   {"has_background", state.has_background},
                   {"takes_meshes", state.takes_meshes},
                   {"trains", state.trains}};
-  return io::json_text(json);
+  return json_text(json);
 }
 
 }  // namespace raysplats::view

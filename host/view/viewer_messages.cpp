@@ -5,11 +5,12 @@
 
 #include <charconv>
 #include <new>
+#include <nlohmann/json.hpp>
 #include <utility>
 #include <variant>
 
-#include "io/json_file.hpp"
 #include "raysplats/error.hpp"
+#include "util/json_text.hpp"
 #include "view/page.hpp"
 #include "view/viewer_impl.hpp"
 
@@ -135,7 +136,7 @@ void Viewer::Impl::excuse(ClientId id, const std::exception& error, const char* 
 void Viewer::Impl::complain(ClientId id, const std::string& what) { say(id, "error", what); }
 void Viewer::Impl::note(ClientId id, const std::string& what) { say(id, "note", what); }
 void Viewer::Impl::say(ClientId id, const char* type, const std::string& what) {
-  server.send_text(id, io::json_text({{"type", type}, {"text", what}}));
+  server.send_text(id, json_text(nlohmann::json{{"type", type}, {"text", what}}));
 }
 
 std::string Viewer::Impl::sentence(const std::exception& error, const char* no_room) {
