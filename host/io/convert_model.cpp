@@ -11,9 +11,9 @@
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>
 #include <utility>
-#include <vector>
 
 #include "io/data_origin.hpp"
+#include "io/float_blur.hpp"
 #include "io/gltf_gaussians.hpp"
 #include "io/model_file.hpp"
 #include "io/ply_options.hpp"
@@ -21,7 +21,6 @@
 #include "raysplats/error.hpp"
 #include "scene/gaussian_transform.hpp"
 #include "scene/model_changes.hpp"
-#include "scene/statistics.hpp"
 #include "util/atomic_file.hpp"
 #include "util/stop_if_interrupted.hpp"
 
@@ -71,19 +70,16 @@ std::optional<Blur> blur_of_moved(const Gaussians& model,
                                   double scale,
                                   const glm::dvec3& offset) {
   constexpr double kMuch = 0.1;
-  std::vector<double> points, log_sizes;
-  points.reserve(model.means.size());
-  log_sizes.reserve(model.size());
+  io::GaussianPlaces places;
+  places.reserve(model.size());
   for (std::size_t i = 0; i < model.size(); ++i) {
     const float* m = &model.means[3 * i];
     const float* s = &model.log_scales[3 * i];
-    const glm::dvec3 point = linear * glm::dvec3(m[0], m[1], m[2]);
-    for (int k = 0; k < 3; ++k) points.push_back(point[k]);
-    log_sizes.push_back(std::max({s[0], s[1], s[2]}));
+    places.add(linear * glm::dvec3(m[0], m[1], m[2]), std::max({s[0], s[1], s[2]}));
   }
-  const glm::dvec3 center = io::median_point(points);
-  const double size = scale * std::exp(median(std::move(log_sizes)));
-  const double most = std::max(io::kUnseenBlur * size, 2.0 * io::blur_at(center));
+  const glm::dvec3 center = places.median_position();
+  const double size = scale * places.median_size();
+  const double most = std::max(io::unseen_blur(size), 2.0 * io::blur_at(center));
   const double shift = io::blur_at(center + offset);
   if (!(shift > most) || glm::length(center + offset) > FLT_MAX) return std::nullopt;
   return Blur{shift, shift > kMuch * size};

@@ -12,11 +12,10 @@
 namespace raysplats::io {
 namespace {
 
-constexpr double kFarAway = 200.0;     // sizes of the scene; single precision has 7 digits
-constexpr double kLeastSize = 1e-6;    // of the distance: cameras in one place have no size
-constexpr double kFarAnyway = 1e4;     // units, where nothing tells the size
-constexpr double kNearest = 0.9;       // share of the cameras or points that is the scene
-constexpr double kRounding = 0x1p-24;  // of a number in single precision
+constexpr double kFarAway = 200.0;   // sizes of the scene; single precision has 7 digits
+constexpr double kLeastSize = 1e-6;  // of the distance: cameras in one place have no size
+constexpr double kFarAnyway = 1e4;   // units, where nothing tells the size
+constexpr double kNearest = 0.9;     // share of the cameras or points that is the scene
 
 double quantile(std::vector<double> values, double q) {
   return quantiles(std::move(values), std::span<const double>(&q, 1))[0];
@@ -59,25 +58,14 @@ glm::dvec3 fitting_origin(std::span<const View> views, std::span<const double> p
   return away > kFarAway * size ? rounded(center, size) : glm::dvec3(0.0);
 }
 
-glm::dvec3 fitting_origin(std::span<const double> points, double detail) {
-  const glm::dvec3 center = median_point(points);
+glm::dvec3 fitting_origin(const GaussianPlaces& places) {
+  const glm::dvec3 center = places.median_position();
   const double away = glm::length(center);
-  if (!std::isfinite(away) || !(blur_at(center) > kUnseenBlur * detail)) return glm::dvec3(0.0);
-  const double size = quantile(distances_to(center, points), kNearest);
+  if (!std::isfinite(away) || !(blur_at(center) > unseen_blur(places.median_size())))
+    return glm::dvec3(0.0);
+  const double size = quantile(distances_to(center, places.positions()), kNearest);
   return rounded(center, std::max(size, kLeastSize * away));
 }
-
-glm::dvec3 median_point(std::span<const double> points) {
-  glm::dvec3 center(0.0);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    std::vector<double> values;
-    for (std::size_t i = axis; i < points.size(); i += 3) values.push_back(points[i]);
-    center[static_cast<int>(axis)] = quantile(std::move(values), 0.5);
-  }
-  return center;
-}
-
-double blur_at(const glm::dvec3& place) { return kRounding * glm::length(place); }
 
 void move_origin(Camera& camera, const glm::dvec3& origin) {
   camera.translation += camera.rotation * origin;

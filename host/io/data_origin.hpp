@@ -4,6 +4,7 @@
 #include <glm/vec3.hpp>
 #include <span>
 
+#include "io/float_blur.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/dataset.hpp"
 
@@ -20,17 +21,9 @@ constexpr double kFarthestOrigin = 1e9;
 /// size, that is from 10 000 units on. `points`: x, y, z each, may be empty.
 glm::dvec3 fitting_origin(std::span<const View> views, std::span<const double> points);
 
-/// The same of points alone, x, y, z each, finite: near their median, rounded to how far they
-/// spread, where single precision would shift them by more than a hundredth of `detail`, a length.
-glm::dvec3 fitting_origin(std::span<const double> points, double detail);
-
-/// The medians of x, of y and of z, which `points` has in turn; 0 for none.
-glm::dvec3 median_point(std::span<const double> points);
-
-/// How far single precision shifts what lies there.
-double blur_at(const glm::dvec3& place);
-/// The share of a detail by which it may shift without being seen.
-constexpr double kUnseenBlur = 0.01;
+/// The same of Gaussians alone, all finite: near their median, rounded to how far they spread,
+/// where single precision would shift them so far that it is seen.
+glm::dvec3 fitting_origin(const GaussianPlaces& places);
 
 /// The same pose counted from `origin`.
 void move_origin(Camera& camera, const glm::dvec3& origin);

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "io/data_origin.hpp"
-#include "scene/statistics.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -36,18 +35,16 @@ std::array<double, 3> origin_of_doubles(const PlyFile& file) {
   });
   if (!doubles || scales.empty()) return {};
   if (const auto third = file.column("scale_2")) scales.push_back(*third);
-  std::vector<double> points, log_sizes;
+  GaussianPlaces places;
   file.for_each_row([&](std::size_t, std::span<const double> values) {
-    double log_size = -HUGE_VAL, sum = 0.0;
+    double log_size = -HUGE_VAL;
     for (const std::size_t column : scales) log_size = std::max(log_size, values[column]);
-    for (const std::size_t column : position) sum += values[column];
+    const glm::dvec3 place(values[position[0]], values[position[1]], values[position[2]]);
     // The others are for whoever reads them.
-    if (!std::isfinite(sum) || !std::isfinite(log_size)) return;
-    for (const std::size_t column : position) points.push_back(values[column]);
-    log_sizes.push_back(log_size);
+    if (!std::isfinite(place.x + place.y + place.z) || !std::isfinite(log_size)) return;
+    places.add(place, log_size);
   });
-  const double detail = std::exp(median(std::move(log_sizes)));
-  const glm::dvec3 origin = fitting_origin(points, detail);
+  const glm::dvec3 origin = fitting_origin(places);
   return {origin.x, origin.y, origin.z};
 }
 
