@@ -27,6 +27,7 @@
 #include "run/checkpoint.hpp"
 #include "run/run_folder.hpp"
 #include "train/adam.hpp"
+#include "train/busy_trainer.hpp"
 #include "train/density_control.hpp"
 #include "train/depth_supervision.hpp"
 #include "train/exposure.hpp"
@@ -320,9 +321,7 @@ struct Trainer::Impl {
   std::optional<FileLock> folder_lock;
 
   [[noreturn]] static void refuse_while_busy() {
-    throw UsageError(
-        "The trainer is training already: call run(), step(), resume() and on_step() when that is "
-        "over, not from its callback");
+    refuse_busy_trainer("run(), step(), resume() and on_step()");
   }
   // Marks the trainer as busy while it lives.
   struct Busy {

@@ -22,6 +22,7 @@
 #include "run/train_config.hpp"
 #include "run/train_option_table.hpp"
 #include "signals.hpp"
+#include "train/busy_trainer.hpp"
 #include "util/nearest_name.hpp"
 
 namespace raysplats::python {
@@ -95,11 +96,7 @@ using Callback = std::optional<nb::callable>;
 class Steps {
  public:
   Steps(HeldTrainer& held, const Callback& callback) : trainer_(*held), taken_(held.taken) {
-    if (taken_.exchange(true)) {
-      throw UsageError(
-          "The trainer is training already: wait for its run() or step(), and call neither from "
-          "its callback");
-    }
+    if (taken_.exchange(true)) refuse_busy_trainer("run() and step()");
     trainer_.on_step([&callback](const TrainProgress& progress) {
       heed_signals(0);
       const nb::gil_scoped_acquire acquire;
