@@ -26,7 +26,7 @@ inline std::vector<CLI::Option*> add_viewer_flags(CLI::App& command, view::Viewe
           ->transform(whole_between(0, 65535))
           ->capture_default_str(),
       command.add_option("--max-size", viewer.max_side, "Largest side of the pictures in pixels")
-          ->transform(whole_between(64, 8192))
+          ->transform(whole_between(view::kLeastMaxSide, view::kMostMaxSide))
           ->capture_default_str()};
 }
 

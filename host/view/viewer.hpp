@@ -14,6 +14,10 @@
 
 namespace raysplats::view {
 
+/// What users may choose as ViewerOptions::max_side.
+constexpr int kLeastMaxSide = 64;
+constexpr int kMostMaxSide = 8192;
+
 struct ViewerOptions {
   ServerOptions server;
   int max_side = 1920;                 ///< pixels of pictures

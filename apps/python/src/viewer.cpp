@@ -26,10 +26,6 @@ namespace nb = nanobind;
 
 using HeldViewer = Held<view::ModelViewer>;
 
-// As of `raysplats view --max-size`.
-constexpr int kLeastSide = 64;
-constexpr int kMostSide = 8192;
-
 void make(HeldViewer* self,
           HeldContext& context,
           HeldModel& model,
@@ -43,8 +39,9 @@ void make(HeldViewer* self,
   view::ViewerOptions viewer;
   viewer.server.host = host;
   viewer.server.port = port;
-  if (max_size < kLeastSide || max_size > kMostSide) {
-    throw UsageError(fmt::format("max_size is {} to {}, not {}", kLeastSide, kMostSide, max_size));
+  if (max_size < view::kLeastMaxSide || max_size > view::kMostMaxSide) {
+    throw UsageError(fmt::format("max_size is {} to {}, not {}", view::kLeastMaxSide,
+                                 view::kMostMaxSide, max_size));
   }
   viewer.max_side = max_size;
   for (const Camera& each : cameras) require_pixels(each);
