@@ -6,25 +6,21 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <fstream>
 #include <iterator>
 #include <map>
 #include <set>
-#include <string_view>
 
 #include "io/colmap_model.hpp"
 #include "prepare/colmap_plan.hpp"
+#include "prepare/colmap_steps.hpp"
 #include "prepare/frames.hpp"
+#include "prepare/work_folder.hpp"
 #include "raysplats/error.hpp"
 #include "util/atomic_file.hpp"
 #include "util/file_kind.hpp"
-#include "util/file_lock.hpp"
 #include "util/number_text.hpp"
-#include "util/output_directory.hpp"
 #include "util/program.hpp"
-#include "util/progress.hpp"
 
 namespace raysplats {
 namespace {
@@ -32,41 +28,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kFewestPhotos = 3;
-
-/// The number behind `before` in a line, 0 when there is none.
-std::size_t number_behind(std::string_view line, std::string_view before) {
-  const std::size_t at = line.find(before);
-  std::size_t value = 0;
-  if (at != std::string_view::npos) {
-    const char* begin = line.data() + at + before.size();
-    std::from_chars(begin, line.data() + line.size(), value);
-  }
-  return value;
-}
-
-bool contains(std::string_view text, std::string_view part) {
-  return text.find(part) != std::string_view::npos;
-}
-
-/// The photo that a line of COLMAP's mapper is about: "Registering image #12 (15)", or of newer
-/// versions "Registering image #12 (num_reg_frames=15)", is the 15th one.
-std::size_t placed_photos(std::string_view line) {
-  if (!contains(line, "Registering image")) return 0;
-  const std::size_t newer = number_behind(line, "num_reg_frames=");
-  return newer > 0 ? newer : number_behind(line, "(");
-}
-
-/// "Matching block [1/2, 1/2]" or "Processing image [3/9]": newer versions of COLMAP have other
-/// words, and the time before them.
-bool tells_match(std::string_view line) {
-  return contains(line, "block [") || contains(line, "image [");
-}
-
-/// The name that an option has by what COLMAP says of its options: about version 3.13 some have
-/// left Sift*, one after the other.
-std::string option_name(std::string_view help, std::string_view newer, std::string_view older) {
-  return std::string(contains(help, newer) ? newer : older);
-}
 
 /// A file as it is now: one that has changed since has another size or time.
 std::string state_of(const fs::path& file) {
@@ -82,9 +43,6 @@ std::string place_of(const fs::path& path) {
   return (place.has_filename() ? place : place.parent_path()).string();
 }
 
-/// The file of a step that is done, which holds its settings.
-fs::path mark_of(const fs::path& data, const std::string& step) { return data / "prepare" / step; }
-
 /// What the mark of the images says that they were made from, in the spelling of then; empty
 /// without a mark.
 std::string former_input(const fs::path& data, const fs::path& input) {
@@ -93,88 +51,6 @@ std::string former_input(const fs::path& data, const fs::path& input) {
   const std::string place = place_of(input);
   return text.starts_with(place + "\n") ? place : text.substr(0, text.find('\n'));
 }
-
-/// Each is made from those before it.
-constexpr std::array<const char*, 4> kSteps{"images", "features", "matches", "model"};
-
-/// The folder that is made, which no other run writes to meanwhile, and which of its steps are done
-/// with which settings.
-class Work {
- public:
-  Work(const fs::path& data, const PrepareWatch& watch)
-      : data_(made(data)), lock_(data_ / ".lock"), watch_(watch) {
-    make_output_directory(data_ / "prepare");
-  }
-
-  /// Whether a step is still to be done with these settings.
-  bool due(const std::string& name, const std::string& settings) const {
-    std::ifstream stream(mark_of(data_, name));
-    const std::string before((std::istreambuf_iterator<char>(stream)), {});
-    return !stream || before != settings;
-  }
-  /// Runs `action` if the step is due, and makes all later steps due.
-  template <class Action>
-  void step(const std::string& name, const std::string& settings, Action action) {
-    if (!due(name, settings)) return;
-    forget(name);
-    action();
-    write_text_file(mark_of(data_, name), settings);
-  }
-  /// Makes a step due and all later ones, even when this run ends before it comes to them.
-  void forget(const std::string& name) const {
-    const auto from = std::find(kSteps.begin(), kSteps.end(), name);
-    std::for_each(from, kSteps.end(), [&](const char* step) { fs::remove(mark_of(data_, step)); });
-  }
-  void colmap(const std::vector<std::string>& arguments,
-              const std::string& step,
-              const std::function<void(std::string_view, std::size_t& done)>& count,
-              std::size_t total) {
-    std::size_t done = 0;
-    std::string trouble;
-    run_program(
-        find_program("colmap", "colmap"), arguments, log(),
-        [&](std::string_view line) {
-          if (trouble.empty() && contains(line, "SQLite error")) trouble = line;
-          count(line, done);
-        },
-        [&] { return !watch_(step, done, total); });
-    // COLMAP 3.8 goes on without what its database could not take, as on a full disk.
-    if (!trouble.empty()) {
-      throw Error(ErrorCode::kRuntime,
-                  fmt::format("The database of colmap could not be written: {} (all it said is in "
-                              "{})",
-                              trouble, log().string()));
-    }
-  }
-  /// What COLMAP says of the options of a command.
-  std::string colmap_help(const std::string& command) const {
-    std::string text;
-    try {
-      run_program(find_program("colmap", "colmap"), {command, "-h"}, log(),
-                  [&](std::string_view line) { text.append(line) += '\n'; }, {});
-    } catch (const Error&) {
-      // Some versions end with an error after it; what else is wrong the command itself will say.
-    }
-    return text;
-  }
-  const fs::path& data() const { return data_; }
-  fs::path operator/(const char* name) const { return data_ / name; }
-  std::string text(const char* name) const { return (data_ / name).string(); }
-  fs::path log() const { return data_ / "prepare.log"; }
-  bool watch(const std::string& step, std::size_t done, std::size_t total) const {
-    return watch_(step, done, total);
-  }
-
- private:
-  static fs::path made(const fs::path& data) {
-    make_output_directory(data);
-    return data;
-  }
-
-  fs::path data_;
-  FileLock lock_;
-  const PrepareWatch& watch_;
-};
 
 std::vector<std::string> lines_of(const fs::path& file) {
   std::ifstream stream(file);
@@ -185,7 +61,7 @@ std::vector<std::string> lines_of(const fs::path& file) {
 
 /// Removes the images that are to be made anew, and before them the poses of what they showed;
 /// check_output() has let in nobody else's.
-void remove_former(const Work& work) {
+void remove_former(const WorkFolder& work) {
   fs::remove_all(work / "sparse");
   fs::remove_all(work / "images");
 }
@@ -193,7 +69,7 @@ void remove_former(const Work& work) {
 std::vector<std::string> gather_images(const fs::path& input,
                                        const std::vector<std::string>& given,
                                        const PrepareOptions& options,
-                                       Work& work) {
+                                       WorkFolder& work) {
   const bool video = !is_folder(input);
   const fs::path images = work / "images";
   // The names of a video's frames, which are known once they are taken, and which data sets of
@@ -232,126 +108,6 @@ std::vector<std::string> gather_images(const fs::path& input,
   if (video && !is_file(frames))
     write_text_file(frames, fmt::format("{}\n", fmt::join(photos_in(images), "\n")));
   return video ? lines_of(frames) : given;
-}
-
-std::string model_settings(const ColmapPlan& plan) {
-  return plan.finds_axis ? "mapper, axis\n" : "mapper\n";
-}
-
-/// How long the steps that are due will take.
-void tell_time(const ColmapPlan& plan, const Work& work) {
-  ColmapSeconds left = plan.seconds;
-  const bool features = work.due("features", plan.feature_settings);
-  const bool matches = features || work.due("matches", plan.matcher.front() + "\n");
-  if (!features) left.features = 0;
-  if (!matches) left.matches = 0;
-  if (!matches && !work.due("model", model_settings(plan))) return;
-  spdlog::info(
-      "COLMAP will take about {} for {} photos, if nothing else runs: features {}, matches {}, "
-      "poses {}",
-      format_duration(left.features + left.matches + left.poses), plan.photos,
-      format_duration(left.features), format_duration(left.matches), format_duration(left.poses));
-}
-
-/// Which photos are compared, where nobody has said it and the number of photos decides.
-void tell_matching(const PrepareOptions& options, const ColmapPlan& plan, const Work& work) {
-  if (options.matching != Matching::kAuto || plan.photos <= kMostExhaustive) return;
-  if (!work.due("features", plan.feature_settings) &&
-      !work.due("matches", plan.matcher.front() + "\n"))
-    return;
-  spdlog::info(
-      "more than {} photos: each is compared with the {} that follow it by name, as by --matching "
-      "sequential, because every pair would take long; photos in no order need --matching "
-      "exhaustive",
-      kMostExhaustive, kSequentialOverlap);
-}
-
-void find_features(const PrepareOptions& options, const ColmapPlan& plan, Work& work) {
-  work.step("features", plan.feature_settings, [&] {
-    fs::remove(work / "database.db");
-    const std::string help = work.colmap_help("feature_extractor");
-    const std::string use_gpu =
-        option_name(help, "--FeatureExtraction.use_gpu", "--SiftExtraction.use_gpu");
-    const std::string max_size =
-        option_name(help, "--FeatureExtraction.max_image_size", "--SiftExtraction.max_image_size");
-    std::size_t before = 0;
-    for (const std::vector<std::string>& photos : plan.cameras) {
-      // COLMAP shares a camera among all photos that one call is given.
-      const fs::path list = work / "prepare/photos.txt";
-      write_text_file(list, fmt::format("{}\n", fmt::join(photos, "\n")));
-      work.colmap(
-          {"feature_extractor", "--database_path", work.text("database.db"), "--image_path",
-           work.text("images"), "--image_list_path", list.string(), "--ImageReader.single_camera",
-           options.cameras == Cameras::kPhoto ? "0" : "1", "--ImageReader.camera_model",
-           options.camera_model, use_gpu, "0", max_size, std::to_string(options.max_size),
-           "--SiftExtraction.max_num_features", std::to_string(plan.features)},
-          "features",
-          [&](std::string_view line, std::size_t& done) {
-            done = std::max(done, before + number_behind(line, "Processed file ["));
-          },
-          plan.photos);
-      before += photos.size();
-    }
-  });
-}
-
-void match(const ColmapPlan& plan, Work& work) {
-  work.step("matches", plan.matcher.front() + "\n", [&] {
-    const std::string use_gpu = option_name(work.colmap_help(plan.matcher.front()),
-                                            "--FeatureMatching.use_gpu", "--SiftMatching.use_gpu");
-    std::vector<std::string> arguments = plan.matcher;
-    arguments.insert(arguments.end(), {"--database_path", work.text("database.db"), use_gpu, "0"});
-    work.colmap(
-        arguments, "matches",
-        [](std::string_view line, std::size_t& done) {
-          if (tells_match(line)) ++done;
-        },
-        plan.match_lines);
-  });
-}
-
-/// The mapper leaves the axis of each lens in the middle of the picture, and turns all photos by
-/// what that is wrong.
-void find_axis(const fs::path& models, Work& work) {
-  for (const fs::directory_entry& model : fs::directory_iterator(models)) {
-    const std::string folder = model.path().string();
-    work.colmap(
-        {"bundle_adjuster", "--input_path", folder, "--output_path", folder,
-         "--BundleAdjustment.refine_principal_point", "1"},
-        "lens", [](std::string_view, std::size_t&) {}, 0);
-  }
-}
-
-void place(const ColmapPlan& plan, Work& work) {
-  work.step("model", model_settings(plan), [&] {
-    const fs::path part = work / "sparse.part";
-    fs::remove_all(part);
-    fs::create_directories(part);
-    bool none = false;
-    try {
-      work.colmap(
-          {"mapper", "--database_path", work.text("database.db"), "--image_path",
-           work.text("images"), "--output_path", part.string()},
-          "poses",
-          [&](std::string_view line, std::size_t& done) {
-            none = none || contains(line, "failed to create sparse model");
-            done = std::max(done, placed_photos(line));
-          },
-          plan.photos);
-    } catch (const Error& error) {
-      // Without a model COLMAP ends with an error, as it does for others.
-      if (error.code() != ErrorCode::kRuntime || !none) throw;
-    }
-    if (!fs::exists(part) || fs::is_empty(part)) {
-      throw DataError(
-          fmt::format("COLMAP found no poses for the {} photos: they have to overlap by more than "
-                      "half and to be sharp (what it said is in {})",
-                      plan.photos, work.log().string()));
-    }
-    if (plan.finds_axis) find_axis(part, work);
-    fs::remove_all(work / "sparse");
-    fs::rename(part, work / "sparse");
-  });
 }
 
 /// The photos to take. Folders below may hold the same photos at other sizes, or masks: theirs are
@@ -434,14 +190,14 @@ Prepared prepare_data(const fs::path& input,
   ColmapPlan plan;
   // A photo that is none is told by its own name, and before anything is removed.
   if (!video) plan = plan_colmap(input, given, options, video);
-  Work work(data, watch);
+  WorkFolder work(data, watch);
   const std::vector<std::string> photos = gather_images(input, given, options, work);
   if (video) plan = plan_colmap(work / "images", photos, options, video);
   if (!video) tell_matching(options, plan, work);
   tell_time(plan, work);
   find_features(options, plan, work);
-  match(plan, work);
-  place(plan, work);
+  match_photos(plan, work);
+  place_photos(plan, work);
 
   const std::optional<fs::path> folder = io::find_colmap_model(data);
   if (!folder) throw DataError(fmt::format("{} holds no model of COLMAP", data.string()));
