@@ -68,6 +68,9 @@
   RECORD(RsAdam) FIELD(RsAdam, beta1) FIELD(RsAdam, rest1) FIELD(RsAdam, beta2) \
     FIELD(RsAdam, rest2) FIELD(RsAdam, epsilon) FIELD(RsAdam, root_scale) FIELD(RsAdam, rate) \
     FIELD(RsAdam, rest_rate) \
+  RECORD(RsLoss) FIELD(RsLoss, width) FIELD(RsLoss, height) FIELD(RsLoss, stride) \
+    FIELD(RsLoss, plane) FIELD(RsLoss, planes) FIELD(RsLoss, composite) FIELD(RsLoss, red) \
+    FIELD(RsLoss, green) FIELD(RsLoss, blue) FIELD(RsLoss, pixel_scale) FIELD(RsLoss, ssim_scale) \
   RECORD(RsForward) FIELD(RsForward, window) FIELD(RsForward, background) \
     FIELD(RsForward, min_transmittance) FIELD(RsForward, max_hits) \
     FIELD(RsForward, pool_capacity) FIELD(RsForward, padding) \

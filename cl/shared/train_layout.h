@@ -39,4 +39,17 @@ typedef struct {
 } RsAdam;
 RS_STATIC_ASSERT_SIZE(RsAdam, 32);
 
+// An image x, the photo y that the loss compares it with, and what the loss makes of both.
+typedef struct {
+  rs_int width, height;
+  rs_int stride, plane;  // of the padded planes that loss_prepare.cl and loss_ssim.cl share
+  rs_int planes;         // of the photo, as train/photo.h says
+  // The mask m. 0: the photo's alpha; 1: the photo is blended over the background and m is 1; 2:
+  // the same, and m is the photo's plane of weights.
+  rs_int composite;
+  rs_float red, green, blue;         // of the background
+  rs_float pixel_scale, ssim_scale;  // of the terms in the gradient
+} RsLoss;
+RS_STATIC_ASSERT_SIZE(RsLoss, 44);
+
 #endif

@@ -6,12 +6,11 @@
 // in local memory with a border of RADIUS, zero beyond the image; a pass along the rows, then one
 // along the columns. Neighbouring work-items touch neighbouring addresses, in local memory as well.
 //   image     planes R, G, B       photo    as train/photo.h says
-//   composite 0: m is the photo's alpha; 1: the photo is blended over the background and m is 1; 2:
-//             the same, and m is the photo's plane of weights
 //   derivatives  per channel planes E, F, G as large as the image
 // Per pixel and channel 2.6 pixels of image and photo are fetched, and as many of each plane of
 // derivatives: 26^2 for 16^2.
 #define LANES 1
+#include "shared/train_layout.h"
 #include "train/loss_pixel.h"
 #include "train/photo.h"
 #include "train/ssim.h"
@@ -45,20 +44,16 @@ typedef struct {
 
 Comparison comparison_of(const __global float* image,
                          const __global uint* photo,
-                         int planes,
-                         int pixels,
-                         int channel,
-                         int composite,
-                         float red,
-                         float green,
-                         float blue) {
+                         const RsLoss loss,
+                         int channel) {
+  const int pixels = loss.width * loss.height;
   const Comparison out = {image + channel * pixels,
                           photo,
-                          planes,
+                          loss.planes,
                           pixels,
                           channel,
-                          composite,
-                          channel == 0 ? red : (channel == 1 ? green : blue)};
+                          loss.composite,
+                          channel == 0 ? loss.red : (channel == 1 ? loss.green : loss.blue)};
   return out;
 }
 
@@ -101,20 +96,15 @@ __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_ssim_de
     __global float* derivatives,
     __global float4* pixel_partials,
     __global float* ssim_partials,
-    int width,
-    int height,
-    int planes,
-    int composite,
-    float red,
-    float green,
-    float blue) {
+    const RsLoss loss) {
   __local float2 pair[SPAN * SPAN];  // u, v
   __local float4 rows[SPAN * SIDE];  // along the rows: means of u, v, u^2, v^2
   const int lane = get_local_id(1) * SIDE + get_local_id(0);
   const int channel = get_group_id(2);
+  const int width = loss.width;
+  const int height = loss.height;
   const int pixels = width * height;
-  const Comparison of =
-      comparison_of(image, photo, planes, pixels, channel, composite, red, green, blue);
+  const Comparison of = comparison_of(image, photo, loss, channel);
 
   const int left = (int)get_group_id(0) * SIDE - RADIUS;
   const int top = (int)get_group_id(1) * SIDE - RADIUS;
@@ -185,16 +175,10 @@ __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_gradien
     const __global uint* photo,
     const __global float* derivatives,
     __global float* gradient,
-    int width,
-    int height,
-    int planes,
-    int composite,
-    float red,
-    float green,
-    float blue,
-    float pixel_scale,
-    float ssim_scale) {
+    const RsLoss loss) {
   const int channel = get_group_id(2);
+  const int width = loss.width;
+  const int height = loss.height;
   const int pixels = width * height;
   const int column = get_global_id(0);
   const int row = get_global_id(1);
@@ -219,16 +203,15 @@ __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_gradien
   barrier(CLK_LOCAL_MEM_FENCE);
 #endif
   if (column >= width || row >= height) return;
-  const Comparison of =
-      comparison_of(image, photo, planes, pixels, channel, composite, red, green, blue);
+  const Comparison of = comparison_of(image, photo, loss, channel);
   const int pixel = row * width + column;
   const Sample s = sample_at(&of, pixel);
   const float v = s.mask * (s.x - s.y);
-  float result = rs_pixel_gradient(v, s.mask, pixel_scale);
+  float result = rs_pixel_gradient(v, s.mask, loss.pixel_scale);
 #if SSIM_GRADIENT
   const int center = lane + RADIUS * SIDE;
   const float u = v + 2.0f * s.y;
-  result += ssim_scale * s.mask *
+  result += loss.ssim_scale * s.mask *
             (RS_WINDOW(rows[0] + center, SIDE) + u * RS_WINDOW(rows[1] + center, SIDE) +
              v * RS_WINDOW(rows[2] + center, SIDE));
 #endif

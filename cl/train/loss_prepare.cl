@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Turns a rendered image x and a photo y into the planes u = x' + y and v = x' - y that SSIM
-// and its gradient read, and sums the pixel term. x' = y + m (x - y) with the mask m: where m = 0
-// both images are equal.
+// and its gradient read, and sums the pixel term. x' = y + m (x - y) with the mask m (RsLoss):
+// where m = 0 both images are equal.
 //
 // Launch: one work-item per tile of TILE x ROWS pixels, grid tiles_x x tiles_y; any work-group
 // size.
 //   pair      3 planes u (R, G, B), then 3 planes v, padded as in train/ssim_window.h, borders zero
-//   composite 0: m is the photo's alpha; 1: the photo is blended over the background and m is 1; 2:
-//             the same, and m is the photo's plane of weights
 //   partials  per tile {sum m rho(x - y), sum m (clamp(x) - y)^2, 3 sum m, 0} over R, G, B
 // Complexity: one pass over the pixels.
+#include "shared/train_layout.h"
 #include "train/loss_pixel.h"
 #include "train/photo.h"
 #include "train/ssim_window.h"
@@ -24,15 +23,9 @@ __kernel void prepare_pair(const __global float* image,
                            const __global uint* photo,
                            __global float* pair,
                            __global float4* partials,
-                           int width,
-                           int height,
-                           int stride,
-                           int plane,
-                           int planes,
-                           int composite,
-                           float red,
-                           float green,
-                           float blue) {
+                           const RsLoss loss) {
+  const int width = loss.width;
+  const int height = loss.height;
   const int tile_x = get_global_id(0);
   const int tile_y = get_global_id(1);
   const int tiles_x = (width + TILE - 1) / TILE;
@@ -63,19 +56,19 @@ __kernel void prepare_pair(const __global float* image,
         valid = rs_load_private(tail[3]);
       }
       fv y[3];
-      for (int c = 0; c < 3; ++c) y[c] = rs_photo_channel(photo, planes, pixels, in, count, c);
-      const fv alpha = rs_photo_channel(photo, planes, pixels, in, count, 3);
+      for (int c = 0; c < 3; ++c) y[c] = rs_photo_channel(photo, loss.planes, pixels, in, count, c);
+      const fv alpha = rs_photo_channel(photo, loss.planes, pixels, in, count, 3);
       fv mask = alpha;
-      if (composite) {
+      if (loss.composite) {
         const fv rest = valid - alpha;
-        y[0] = y[0] * alpha + red * rest;
-        y[1] = y[1] * alpha + green * rest;
-        y[2] = y[2] * alpha + blue * rest;
-        mask = composite == 2 ? rs_photo_weight(photo, planes, pixels, in, count) : valid;
+        y[0] = y[0] * alpha + loss.red * rest;
+        y[1] = y[1] * alpha + loss.green * rest;
+        y[2] = y[2] * alpha + loss.blue * rest;
+        mask = loss.composite == 2 ? rs_photo_weight(photo, loss.planes, pixels, in, count) : valid;
       }
-      __global float* out = pair + RS_PADDED(row, stride) + column;
+      __global float* out = pair + RS_PADDED(row, loss.stride) + column;
       for (int c = 0; c < 3; ++c) {
-        store_pair(x[c], y[c], mask, out + c * plane, out + (3 + c) * plane, &sums);
+        store_pair(x[c], y[c], mask, out + c * loss.plane, out + (3 + c) * loss.plane, &sums);
       }
     }
   }

@@ -8,6 +8,7 @@
 // Both are padded, with borders of zeros.
 // Complexity: 2 x 11 multiply-adds per moment and pixel: a column pass into private memory, then a
 // row pass.
+#include "shared/train_layout.h"
 #include "train/loss_pixel.h"
 #include "train/photo.h"
 #include "train/ssim.h"
@@ -22,10 +23,11 @@
 __kernel void ssim_derivatives(const __global float* pair,
                                __global float* derivatives,
                                __global float* partials,
-                               int width,
-                               int height,
-                               int stride,
-                               int plane) {
+                               const RsLoss loss) {
+  const int width = loss.width;
+  const int height = loss.height;
+  const int stride = loss.stride;
+  const int plane = loss.plane;
   const int tile_x = get_global_id(0);
   const int tile_y = get_global_id(1);
   const int channel = get_global_id(2);
@@ -90,19 +92,16 @@ __kernel void ssim_derivatives(const __global float* pair,
 }
 
 // gradient = pixel_scale * m rho'(x - y) + ssim_scale * m dSSIM/dx' for R, G, B; the A plane is
-// zeroed. `masked`: 0, m = 1; 1, the photo's alpha; 2, its plane of weights.
+// zeroed.
 __kernel void loss_gradient(const __global float* pair,
                             const __global float* derivatives,
                             const __global uint* photo,
                             __global float* gradient,
-                            int width,
-                            int height,
-                            int stride,
-                            int plane,
-                            int planes,
-                            int masked,
-                            float pixel_scale,
-                            float ssim_scale) {
+                            const RsLoss loss) {
+  const int width = loss.width;
+  const int height = loss.height;
+  const int stride = loss.stride;
+  const int plane = loss.plane;
   const int tile_x = get_global_id(0);
   const int tile_y = get_global_id(1);
   const int channel = get_global_id(2);
@@ -132,12 +131,14 @@ __kernel void loss_gradient(const __global float* pair,
       const int pixel = row * width + column;
       const bool whole = column + LANES <= last;
       fv mask = (fv)(1.0f);
-      if (masked == 1) mask = rs_photo_channel(photo, planes, pixels, pixel, last - column, 3);
-      if (masked == 2) mask = rs_photo_weight(photo, planes, pixels, pixel, last - column);
-      fv result = rs_pixel_gradient(v, mask, pixel_scale);
+      if (loss.composite == 0)
+        mask = rs_photo_channel(photo, loss.planes, pixels, pixel, last - column, 3);
+      if (loss.composite == 2)
+        mask = rs_photo_weight(photo, loss.planes, pixels, pixel, last - column);
+      fv result = rs_pixel_gradient(v, mask, loss.pixel_scale);
 #if SSIM_GRADIENT
       const fv u = rs_load(center);
-      result += ssim_scale * mask *
+      result += loss.ssim_scale * mask *
                 (rs_window_row(e + HALO + i) + u * rs_window_row(f + HALO + i) +
                  v * rs_window_row(g + HALO + i));
 #endif

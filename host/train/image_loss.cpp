@@ -8,6 +8,7 @@
 
 #include "raysplats/error.hpp"
 #include "scene/pixel_count.hpp"
+#include "shared/train_layout.h"
 #include "train/lanes.hpp"
 
 namespace raysplats {
@@ -114,39 +115,47 @@ struct ImageLoss::Impl {
     laid_out = true;
   }
 
+  RsLoss record(const DevicePhoto& photo,
+                bool alpha_is_background,
+                std::array<float, 3> background) const {
+    const float share = 1.0f / (3.0f * static_cast<float>(pixel_count(width, height)));
+    RsLoss loss{};
+    loss.width = width;
+    loss.height = height;
+    loss.stride = stride;
+    loss.plane = plane;
+    loss.planes = photo.planes;
+    loss.composite = photo.composite(alpha_is_background);
+    loss.red = background[0];
+    loss.green = background[1];
+    loss.blue = background[2];
+    loss.pixel_scale = (1.0f - ssim_weight) * share;
+    loss.ssim_scale = -ssim_weight * share;
+    return loss;
+  }
+
   void evaluate_tiles(const Buffer<float>& image,
                       const DevicePhoto& photo,
-                      int composite,
-                      std::array<float, 3> background,
-                      std::array<float, 2> scales,
+                      const RsLoss& loss,
                       Buffer<float>& gradient) {
     Range range{{tiles_x(), tiles_y(), 1}, {0, 0, 0}};
     if (serial) range.local = {1, 1, 1};
-    prepare.launch(range, image, photo.words, pair, pixel_partials, width, height, stride, plane,
-                   photo.planes, composite, background[0], background[1], background[2]);
+    prepare.launch(range, image, photo.words, pair, pixel_partials, loss);
     range.global[2] = 3;
-    derivatives_kernel.launch(range, pair, derivatives, ssim_partials, width, height, stride,
-                              plane);
-    const int masked = composite == 0 ? 1 : (composite == 1 ? 0 : 2);
-    gradient_kernel.launch(range, pair, derivatives, photo.words, gradient, width, height, stride,
-                           plane, photo.planes, masked, scales[0], scales[1]);
+    derivatives_kernel.launch(range, pair, derivatives, ssim_partials, loss);
+    gradient_kernel.launch(range, pair, derivatives, photo.words, gradient, loss);
   }
 
   void evaluate_groups(const Buffer<float>& image,
                        const DevicePhoto& photo,
-                       int composite,
-                       std::array<float, 3> background,
-                       std::array<float, 2> scales,
+                       const RsLoss& loss,
                        Buffer<float>& gradient) {
     Range range = Range::plane(static_cast<std::size_t>(width), static_cast<std::size_t>(height),
                                kSide, kSide);
     range.global[2] = 3;
     derivatives_kernel.launch(range, image, photo.words, derivatives, pixel_partials, ssim_partials,
-                              width, height, photo.planes, composite, background[0], background[1],
-                              background[2]);
-    gradient_kernel.launch(range, image, photo.words, derivatives, gradient, width, height,
-                           photo.planes, composite, background[0], background[1], background[2],
-                           scales[0], scales[1]);
+                              loss);
+    gradient_kernel.launch(range, image, photo.words, derivatives, gradient, loss);
   }
 };
 
@@ -172,13 +181,11 @@ void ImageLoss::evaluate(const Buffer<float>& image,
   s.resize(width, height);
   gradient.ensure(s.context, 4 * pixels, "image gradient");
 
-  const int composite = photo.composite(alpha_is_background);
-  const float share = 1.0f / (3.0f * static_cast<float>(pixels));
-  const std::array<float, 2> scales{(1.0f - s.ssim_weight) * share, -s.ssim_weight * share};
+  const RsLoss loss = s.record(photo, alpha_is_background, background);
   if (s.grouped) {
-    s.evaluate_groups(image, photo, composite, background, scales, gradient);
+    s.evaluate_groups(image, photo, loss, gradient);
   } else {
-    s.evaluate_tiles(image, photo, composite, background, scales, gradient);
+    s.evaluate_tiles(image, photo, loss, gradient);
   }
 }
 
