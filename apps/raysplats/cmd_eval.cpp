@@ -13,6 +13,7 @@
 #include "commands.hpp"
 #include "eval/former_pictures.hpp"
 #include "frame_progress.hpp"
+#include "model_argument.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/evaluation.hpp"
@@ -121,11 +122,7 @@ void run(const Options& options, const GlobalOptions& global) {
 Command add_eval_command(CLI::App& app, const GlobalOptions& global) {
   CLI::App* command = app.add_subcommand("eval", "Compare a model with the photos of a data set");
   auto options = std::make_shared<Options>();
-  command
-      ->add_option("MODEL", options->model,
-                   "Model (PLY, .splat, SPZ, SOG, glTF), or the folder of a training run")
-      ->required()
-      ->type_name("");
+  add_model_argument(*command, options->model);
   command->add_option("-o,--output", options->output, "Folder for metrics.json and pictures")
       ->required()
       ->check(not_empty())

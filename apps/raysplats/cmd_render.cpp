@@ -14,6 +14,7 @@
 #include "io/dataset_views.hpp"
 #include "io/scene_camera.hpp"
 #include "io/scene_file.hpp"
+#include "model_argument.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -256,12 +257,7 @@ Command add_render_command(CLI::App& app, const GlobalOptions& global) {
   CLI::App* command = app.add_subcommand(
       "render", "Render a model or a scene file from a data set's cameras, a file's or an orbit");
   auto options = std::make_shared<RenderFlags>();
-  command
-      ->add_option("MODEL", options->model,
-                   "Model (PLY, .splat, SPZ, SOG, glTF), the folder of a training run, or a scene "
-                   "file (.toml)")
-      ->required()
-      ->type_name("");
+  add_model_argument(*command, options->model, true);
   add_render_options(*command, *options);
   return {command, [options, &global] { run(*options, global); }};
 }

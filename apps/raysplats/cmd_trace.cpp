@@ -10,6 +10,7 @@
 
 #include "commands.hpp"
 #include "io/ray_file.hpp"
+#include "model_argument.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
@@ -75,11 +76,7 @@ void run(const Options& options) {
 Command add_trace_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("trace", "Trace rays of your own through a model");
   auto options = std::make_shared<Options>();
-  command
-      ->add_option("MODEL", options->model,
-                   "Model (PLY, .splat, SPZ, SOG, glTF), or the folder of a training run")
-      ->required()
-      ->type_name("");
+  add_model_argument(*command, options->model);
   command
       ->add_option("--rays", options->rays,
                    "Array (..., 6) of origins and directions, or (..., 8) with t_min and t_max, of "

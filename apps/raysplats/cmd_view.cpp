@@ -15,6 +15,7 @@
 #include "io/camera_list.hpp"
 #include "io/scene_file.hpp"
 #include "io/scene_loader.hpp"
+#include "model_argument.hpp"
 #include "options.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/model.hpp"
@@ -244,12 +245,7 @@ void run(const Options& options) {
 Command add_view_command(CLI::App& app) {
   CLI::App* command = app.add_subcommand("view", "Show a model or a scene file in a browser, live");
   auto options = std::make_shared<Options>();
-  command
-      ->add_option("MODEL", options->model,
-                   "Model (PLY, .splat, SPZ, SOG, glTF), the folder of a training run, or a scene "
-                   "file (.toml)")
-      ->required()
-      ->type_name("");
+  add_model_argument(*command, options->model, true);
   add_data_flags(*command, options->data, "test, train or all (default)");
   command
       ->add_option("--cameras", options->cameras,
