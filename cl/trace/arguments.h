@@ -45,6 +45,14 @@
       __global const RsLine *restrict lines, __global const float *restrict image_gradient, \
       __global const float *restrict depth_gradient, __global float *restrict gradients
 
+// The gradients of the lines of the Gaussians from number `begin` to `end`, and where they are
+// carried on to: the parameters, with POSE the camera too.
+#define RS_FINALIZE_ARGUMENTS                                                                  \
+  const uint begin, const uint end, const RsFinalize finalize, const RsCamera camera_argument, \
+      __global float *restrict line_gradients, __global const RsViewBounds *restrict bounds,   \
+      __global const RsLine *restrict lines, RS_GAUSSIAN_ARGUMENTS, RS_GRADIENT_ARGUMENTS,     \
+      __global float *restrict pose
+
 // Rays and the order in which they are taken, read when `ordered`.
 #define RS_RAY_ARGUMENTS \
   __global const RsRay *restrict rays, const int ordered, __global const uint *restrict ray_order

@@ -62,16 +62,7 @@ void add_rows(__global float* p, const uint stride, const fv* rows) {
 }
 #endif
 
-__kernel void finalize_gradients(const uint begin,
-                                 const uint end,
-                                 const RsFinalize finalize,
-                                 const RsCamera camera_argument,
-                                 __global float* restrict line_gradients,
-                                 __global const RsViewBounds* restrict bounds,
-                                 __global const RsLine* restrict lines,
-                                 RS_GAUSSIAN_ARGUMENTS,
-                                 RS_GRADIENT_ARGUMENTS,
-                                 __global float* restrict pose) {
+__kernel void finalize_gradients(RS_FINALIZE_ARGUMENTS) {
 #if !POSE
   (void)pose;
 #endif

@@ -121,16 +121,7 @@ void unpark(const __local float* row, ViewGaussian* g, float* mean) {
 }
 
 __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
-    const uint begin,
-    const uint end,
-    const RsFinalize finalize,
-    const RsCamera camera_argument,
-    __global float* restrict line_gradients,
-    __global const RsViewBounds* restrict bounds,
-    __global const RsLine* restrict lines,
-    RS_GAUSSIAN_ARGUMENTS,
-    RS_GRADIENT_ARGUMENTS,
-    __global float* restrict pose) {
+    RS_FINALIZE_ARGUMENTS) {
 #if !POSE
   (void)pose;
 #endif
