@@ -58,6 +58,12 @@ double fitted(const FittedRate& rate, const TrainOptions& options) {
   return std::clamp(rate.usual * std::sqrt(kFittedIterations / steps), rate.least, rate.most);
 }
 
+// A rate that begins with `start` where nothing else is given, but not below a given final one.
+LearningRate with_start(LearningRate rate, double start) {
+  if (rate.initial == kFitted) rate.initial = std::max(start, rate.final_value);
+  return rate;
+}
+
 // A rate whose initial value is known: it never rises to a final one that is fitted.
 LearningRate with_end(LearningRate rate, const FittedRate& end, const TrainOptions& options) {
   if (rate.final_value == kFitted) rate.final_value = std::min(fitted(end, options), rate.initial);
@@ -85,10 +91,8 @@ LearningRate rotation_rate(const TrainOptions& options) {
 }
 
 LearningRate scale_rate(const TrainOptions& options) {
-  LearningRate rate = options.scale_lr;
-  if (rate.initial == kFitted)
-    rate.initial = std::max(fitted(kScaleRate, options), rate.final_value);
-  return with_end(rate, kScaleFinalRate, options);
+  const double start = fitted(kScaleRate, options);
+  return with_end(with_start(options.scale_lr, start), kScaleFinalRate, options);
 }
 
 LearningRate opacity_rate(const TrainOptions& options) {
@@ -100,10 +104,8 @@ LearningRate sh_rate(const TrainOptions& options) {
 }
 
 LearningRate sh_rest_rate(const TrainOptions& options) {
-  LearningRate rate = options.sh_rest_lr;
-  if (rate.initial == kFitted)
-    rate.initial = std::max(fitted(kShRestRate, options), rate.final_value);
-  return with_end(rate, kShRestFinalRate, options);
+  const double start = fitted(kShRestRate, options);
+  return with_end(with_start(options.sh_rest_lr, start), kShRestFinalRate, options);
 }
 
 double color_share(const TrainOptions& options) {
@@ -111,10 +113,8 @@ double color_share(const TrainOptions& options) {
 }
 
 LearningRate position_rate(const TrainOptions& options) {
-  LearningRate rate = options.position_lr;
-  if (rate.initial == kFitted)
-    rate.initial = std::max(clears_random_start(options) ? 2e-3 : 5e-4, rate.final_value);
-  return with_end(rate, kPositionFinalRate, options);
+  const double start = clears_random_start(options) ? 2e-3 : 5e-4;
+  return with_end(with_start(options.position_lr, start), kPositionFinalRate, options);
 }
 
 double start_opacity(const TrainOptions& options) {
