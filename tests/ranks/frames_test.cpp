@@ -2,7 +2,9 @@
 // Frames and evaluations that several ranks share.
 #include <doctest/doctest.h>
 
+#include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 
@@ -30,6 +32,28 @@ struct Orbit {
     return {"eval", model, "--data", tiny_data(), "--split", "all", "-o", folder / out, "-q"};
   }
 };
+
+// Two frames of a command, which is told a folder, are the same for more ranks than frames as for
+// one; returns how many files they are.
+std::size_t check_two_frames(const Orbit& orbit,
+                             const std::string& name,
+                             const std::function<Words(const std::string& out)>& command) {
+  const std::string one = "one " + name;
+  const Outcome alone = raysplats_program(command(one));
+  INFO(alone.err);
+  REQUIRE(alone.code == 0);
+  const auto expected = files_of(orbit.folder / one);
+  for (const std::string devices : {"0,0,0", "0,0,0,0,0,0,0"}) {
+    CAPTURE(devices);
+    const std::string out = name + " of " + devices;
+    const Outcome shared = raysplats_program(command(out) + Words{"--device", devices});
+    INFO(shared.err);
+    REQUIRE(shared.code == 0);
+    CHECK(contains(shared.out, "2 frames in"));
+    CHECK(files_of(orbit.folder / out) == expected);
+  }
+  return expected.size();
+}
 
 }  // namespace
 
@@ -85,19 +109,7 @@ TEST_CASE("ranks draw bands of a frame where there are fewer frames than ranks")
                    "70",     "-o",        orbit.folder / out, "-q"} +
              ways[i];
     };
-    const std::string one = "one " + std::to_string(i);
-    const Outcome alone = raysplats_program(command(one));
-    INFO(alone.err);
-    REQUIRE(alone.code == 0);
-    for (const std::string devices : {"0,0,0", "0,0,0,0,0,0,0"}) {
-      CAPTURE(devices);
-      const std::string out = std::to_string(i) + " of " + devices;
-      const Outcome shared = raysplats_program(command(out) + Words{"--device", devices});
-      INFO(shared.err);
-      REQUIRE(shared.code == 0);
-      CHECK(contains(shared.out, "2 frames in"));
-      CHECK(files_of(orbit.folder / out) == files_of(orbit.folder / one));
-    }
+    check_two_frames(orbit, std::to_string(i), command);
   }
 }
 
@@ -122,20 +134,7 @@ TEST_CASE("ranks draw bands of a scene with meshes where there are fewer frames 
     const auto command = [&](const std::string& out) {
       return Words{"render", file, "-o", orbit.folder / out, "-q"};
     };
-    const std::string one = "one " + std::to_string(i);
-    const Outcome alone = raysplats_program(command(one));
-    INFO(alone.err);
-    REQUIRE(alone.code == 0);
-    REQUIRE(files_of(orbit.folder / one).size() == 2);
-    for (const std::string devices : {"0,0,0", "0,0,0,0,0,0,0"}) {
-      CAPTURE(devices);
-      const std::string out = std::to_string(i) + " of " + devices;
-      const Outcome shared = raysplats_program(command(out) + Words{"--device", devices});
-      INFO(shared.err);
-      REQUIRE(shared.code == 0);
-      CHECK(contains(shared.out, "2 frames in"));
-      CHECK(files_of(orbit.folder / out) == files_of(orbit.folder / one));
-    }
+    REQUIRE(check_two_frames(orbit, std::to_string(i), command) == 2);
   }
 }
 

@@ -40,6 +40,14 @@ void wait_for_checkpoint(RunningProgram& program, const std::string& run) {
   }
 }
 
+// Makes a named pipe; returns its end to read from.
+int open_pipe(const std::string& path) {
+  REQUIRE(::mkfifo(path.c_str(), 0600) == 0);
+  const int reader = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  REQUIRE(reader >= 0);
+  return reader;
+}
+
 bool every_checkpoint_is_whole(const std::string& run) {
   for (const auto& path : raysplats::list_checkpoints(run)) {
     try {
@@ -98,9 +106,7 @@ TEST_CASE("a run whose terminal is closed saves all, and one under nohup goes on
   }
   SUBCASE("that of a program which reads what it prints, as in train | tee") {
     const std::string pipe = folder / "pipe";
-    REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
-    const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-    REQUIRE(reader >= 0);
+    const int reader = open_pipe(pipe);
     Surroundings there;
     there.out_file = there.err_file = pipe;
     RunningProgram program(endless(folder / "run"), there);
@@ -112,9 +118,7 @@ TEST_CASE("a run whose terminal is closed saves all, and one under nohup goes on
   }
   SUBCASE("that of a program which has read enough, as in train | head") {
     const std::string pipe = folder / "pipe";
-    REQUIRE(::mkfifo(pipe.c_str(), 0600) == 0);
-    const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-    REQUIRE(reader >= 0);
+    const int reader = open_pipe(pipe);
     Surroundings there;
     there.out_file = there.err_file = pipe;
     // A line of each evaluation.
