@@ -143,12 +143,25 @@ void balance(std::span<SmallPhoto> photos) {
   }
 }
 
+bool SmallPhoto::shows_body(int x, int y) const {
+  constexpr float kOpaque = 0.5f;  // what pixels at a body's outline have in the mean
+  const float alpha = picture->at(x, y)[3];
+  if (alpha >= kOpaque || alpha <= kLeastAlpha) return alpha >= kOpaque;
+  for (int v = std::max(y - 1, 0); v <= std::min(y + 1, picture->height - 1); ++v) {
+    for (int u = std::max(x - 1, 0); u <= std::min(x + 1, picture->width - 1); ++u) {
+      if (picture->at(u, v)[3] <= kLeastAlpha) return false;
+    }
+  }
+  return true;
+}
+
 double opaque_share(std::span<const SmallPhoto> photos) {
   double sum = 0;
   for (const SmallPhoto& photo : photos) {
     std::size_t opaque = 0;
-    for_each_pixel(
-        photo, [&opaque](const std::array<float, 4>& rgba) { opaque += rgba[3] >= 0.5f ? 1 : 0; });
+    for (int y = 0; y < photo.picture->height; ++y) {
+      for (int x = 0; x < photo.picture->width; ++x) opaque += photo.shows_body(x, y) ? 1 : 0;
+    }
     const std::size_t pixels = std::max<std::size_t>(photo.picture->pixels(), 1);
     sum += static_cast<double>(opaque) / static_cast<double>(pixels);
   }
@@ -192,7 +205,7 @@ double color_range(std::span<const SmallPhoto> photos) {
     for (int y = 0; y < photo.picture->height; ++y) {
       for (int x = 0; x < photo.picture->width; ++x) {
         const std::array<float, 4> rgba = photo.color(x, y);
-        if (rgba[3] < 0.5f || photo.picture->weight(x, y) < 0.5f) continue;
+        if (!photo.shows_body(x, y) || photo.picture->weight(x, y) < 0.5f) continue;
         for (std::size_t c = 0; c < 3; ++c) channels[c].push_back(static_cast<double>(rgba[c]));
       }
     }

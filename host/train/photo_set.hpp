@@ -17,6 +17,9 @@
 
 namespace raysplats {
 
+/// Alpha above which a pixel shows something: mattes that programs make are seldom 0 all over.
+constexpr float kLeastAlpha = 0.02f;
+
 /// A reduced photo and the camera that would have taken it.
 struct SmallPhoto {
   Camera camera;
@@ -30,6 +33,9 @@ struct SmallPhoto {
   glm::dvec4 at(const glm::dvec2& point) const;
   /// Whether the pixel that contains the image point counts: at least half of it is not masked out.
   bool known(const glm::dvec2& point) const;
+  /// Whether the pixel shows a body: it is at least half opaque, or shows something (kLeastAlpha)
+  /// with all that is around it, as half-transparent bodies do and outlines do not.
+  bool shows_body(int x, int y) const;
   /// Where a world point is seen inside the picture.
   std::optional<glm::dvec2> sees(const glm::dvec3& world) const;
 };
@@ -52,7 +58,7 @@ std::vector<SmallPhoto> load_small_photos(const Dataset& dataset,
 /// of which nothing counts keeps its own.
 void balance(std::span<SmallPhoto> photos);
 
-/// Mean share of the pixels that show something: alpha at least one half.
+/// Mean share of the pixels that show a body.
 double opaque_share(std::span<const SmallPhoto> photos);
 
 /// Whether a pixel of a photo shows anything, however faint: alpha above 0.

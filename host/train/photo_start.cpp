@@ -21,7 +21,6 @@ constexpr std::uint64_t kScatterStream = 0x73636174746572;
 constexpr std::size_t kTriesPerPoint = 200;
 
 constexpr std::size_t kColourPhotos = 24;  // that tell the colour of a scattered point
-constexpr double kLeastAlpha = 0.02;       // mattes that programs make are seldom 0 all over
 
 // Whether the photo shows something at the point or next to it.
 bool shows_something(const SmallPhoto& photo, const glm::dvec2& point) {
@@ -53,12 +52,13 @@ PointCloud carved_points(std::span<const SmallPhoto> photos,
                          std::uint64_t seed) {
   CounterRng rng(seed, kCarveStream);
   PointCloud out;
-  std::vector<glm::dvec3> colors;
+  std::vector<glm::dvec3> colors, faint;
   for (std::size_t tried = 0; out.size() < count && tried < kTriesPerPoint * count; ++tried) {
     glm::dvec3 world;
     for (int a = 0; a < 3; ++a)
       world[a] = region.center[a] + region.half_side * (2.0 * rng.uniform() - 1.0);
     colors.clear();
+    faint.clear();
     bool inside = true;
     for (const SmallPhoto& photo : photos) {
       const auto point = photo.sees(world);
@@ -68,7 +68,9 @@ PointCloud carved_points(std::span<const SmallPhoto> photos,
       if (!inside) break;
       const glm::dvec4 color = photo.at(*point);
       if (color.w > 0.5) colors.emplace_back(color);
+      if (color.w > kLeastAlpha) faint.emplace_back(color);
     }
+    if (colors.empty()) colors = faint;  // of what is half transparent
     if (inside && !colors.empty()) append_point(out, world, median_color(colors));
   }
   return out;
