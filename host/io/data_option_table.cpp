@@ -4,11 +4,18 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
+#include <set>
+#include <string>
+#include <utility>
 
 #include "io/data_origin.hpp"
+#include "io/test_list.hpp"
 #include "raysplats/error.hpp"
 #include "util/number_text.hpp"
+#include "util/utf8.hpp"
 
 namespace raysplats {
 namespace {
@@ -28,6 +35,42 @@ void add_downscale_option(OptionTable& table, DatasetOptions& options) {
       },
       [&options] {
         return options.downscale == 0 ? toml_text("auto") : fmt::format("{}", options.downscale);
+      });
+}
+
+// That configurations, which keep the names, can hold them.
+const std::set<std::string>& storable(const std::set<std::string>& names) {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 18;  // checkpoints hold a configuration too
+  const std::string text = io::text_of(names);
+  const bool plain =
+      is_utf8(text) && text.find(kTomlLines) == std::string::npos &&
+      std::none_of(text.begin(), text.end(), [](char c) {
+        return (static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t') || c == 0x7f;
+      });
+  if (!plain || text.size() > kMostBytes) {
+    throw UsageError(fmt::format(
+        "The option 'test-list' names a text file of UTF-8 with a photo's name in each line, "
+        "without control characters and {}, and of at most {} bytes: give such a file",
+        kTomlLines, kMostBytes));
+  }
+  return names;
+}
+
+void add_test_list_option(OptionTable& table, DatasetOptions& options) {
+  table.add(
+      "test-list",
+      "text file with the names of the photos that are held out, one a line, in place of those "
+      "that test-every and files of the data set say; the run's configuration then has the names "
+      "themselves",
+      [&options](const OptionTable::Values& values) {
+        const std::string& value = option_value("test-list", values);
+        options.test_list.reset();
+        if (value.empty()) return;
+        const bool is_list = value.find('\n') != std::string::npos;
+        options.test_list = storable(is_list ? io::names_in(value) : read_test_list(value));
+      },
+      [&options] {
+        return options.test_list ? toml_lines(io::text_of(*options.test_list)) : toml_text("");
       });
 }
 
@@ -65,6 +108,7 @@ void add_data_options(OptionTable& table, DatasetOptions& options) {
   add_downscale_option(table, options);
   table.number("test-every", options.test_every, 0, 1e9,
                "every n-th view is held out when the data set has no split of its own; 0 = none");
+  add_test_list_option(table, options);
   table.flag("undistort", options.undistort,
              "turn photos through lenses with OpenCV distortion into pinhole pictures; false = "
              "their own pixels and rays");
@@ -90,6 +134,18 @@ std::vector<OptionRow> data_option_rows(DatasetOptions& options) {
   OptionTable table;
   add_data_options(table, options);
   return table.take();
+}
+
+void refuse_two_splits() {
+  throw UsageError("--test-every and --test-list contradict each other: leave one of them out");
+}
+
+DatasetOptions DataSettings::over(DatasetOptions base) const {
+  if (has("test-every")) {
+    if (has("test-list")) refuse_two_splits();
+    base.test_list.reset();
+  }
+  return GivenOptions::over(std::move(base));
 }
 
 }  // namespace raysplats

@@ -16,6 +16,13 @@ void add_data_options(OptionTable& table, DatasetOptions& options);
 /// These rows, bound to `options`.
 std::vector<OptionRow> data_option_rows(DatasetOptions& options);
 
-using DataSettings = GivenOptions<DatasetOptions, data_option_rows>;
+/// Throws UsageError: of --test-every and --test-list only one can be heeded.
+[[noreturn]] void refuse_two_splits();
+
+class DataSettings : public GivenOptions<DatasetOptions, data_option_rows> {
+ public:
+  /// A number of --test-every goes before the list of a run. Throws UsageError for both.
+  DatasetOptions over(DatasetOptions base) const;
+};
 
 }  // namespace raysplats

@@ -17,6 +17,7 @@
 #include "io/photo_views.hpp"
 #include "io/repeated_photos.hpp"
 #include "io/sized_dataset.hpp"
+#include "io/test_list.hpp"
 #include "raysplats/error.hpp"
 #include "util/file_kind.hpp"
 
@@ -51,6 +52,10 @@ Dataset read_views(const fs::path& path, const fs::path& root, const DatasetOpti
   Dataset dataset = path == root ? io::read_data_folder(root, options)
                                  : io::read_named_transforms(root / path.filename(), options);
   dataset.root = root;
+  if (options.test_list) {
+    io::hold_out(dataset, *options.test_list);
+    io::sort_by_name(dataset.views);
+  }
   if (dataset.views.empty()) {
     throw DataError(
         fmt::format("The data set {} has no views: there is nothing to train on", root.string()));

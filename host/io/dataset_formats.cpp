@@ -21,6 +21,7 @@
 #include "io/frame_lists.hpp"
 #include "io/llff.hpp"
 #include "io/photo_folder.hpp"
+#include "io/photo_views.hpp"
 #include "io/photo_mask.hpp"
 #include "io/ply_points.hpp"
 #include "io/polycam.hpp"
@@ -34,9 +35,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void mark_every(Dataset& dataset, int test_every) {
+void mark_every(Dataset& dataset, const DatasetOptions& options) {
   std::vector<View>& views = dataset.views;
-  if (test_every <= 0) return;
+  const int test_every = options.test_every;
+  if (test_every <= 0 || options.test_list) return;
   if (views.size() == 1 && test_every > 1) return;  // a photo alone is trained on
   const auto step = static_cast<std::size_t>(test_every);
   for (std::size_t i = 0; i < views.size(); i += step) views[i].test = true;
@@ -68,11 +70,6 @@ void set_origin(Dataset& dataset, std::span<const double> points, const DatasetO
   }
 }
 
-void sort_by_name(std::vector<View>& views) {
-  std::stable_sort(views.begin(), views.end(),
-                   [](const View& a, const View& b) { return a.camera.name < b.camera.name; });
-}
-
 /// Gives the data set the points of a PLY; returns their positions as precise as they are there.
 std::vector<double> take_points(Dataset& dataset, const fs::path& path) {
   PlyPoints points = read_ply_points(path);
@@ -88,8 +85,10 @@ Dataset load_colmap(const fs::path& root,
   dataset.kind = DatasetKind::kColmap;
   dataset.points = std::move(model.points);
   dataset.views = colmap_views(model, model_folder, root, options);
+  const bool divided =
+      divide_by_lists(model, model_folder, root, options.test_list.has_value(), dataset.views);
   sort_by_name(dataset.views);
-  mark_every(dataset, options.test_every);
+  if (!divided) mark_every(dataset, options);
   set_origin(dataset, model.positions, options);
   return dataset;
 }
@@ -138,7 +137,7 @@ Dataset load_blender(const fs::path& root, const DatasetOptions& options) {
     }
   } else {
     require_photos_of_their_own({&train});
-    mark_every(dataset, options.test_every);
+    mark_every(dataset, options);
   }
   set_origin(dataset, points, options);
   return dataset;
@@ -179,9 +178,10 @@ Dataset load_nerfstudio(const fs::path& path, const DatasetOptions& options) {
   dataset.kind = DatasetKind::kNerfstudio;
   const std::set<std::string> names = frame_names(file);
   dataset.views = views_of(file, options);
-  const bool divided = divide_by_lists(file, names, dataset.views);
+  const bool divided =
+      divide_by_lists(file, names, options.test_list.has_value(), dataset.views);
   sort_by_name(dataset.views);
-  if (!divided) mark_every(dataset, options.test_every);
+  if (!divided) mark_every(dataset, options);
   std::vector<double> points;
   if (const auto path = points_of(file)) points = take_points(dataset, *path);
   set_origin(dataset, points, options);
@@ -194,7 +194,7 @@ Dataset load_frames(DatasetKind kind, TransformsFile file, const DatasetOptions&
   dataset.kind = kind;
   dataset.views = views_of(file, options);
   sort_by_name(dataset.views);
-  mark_every(dataset, options.test_every);
+  mark_every(dataset, options);
   set_origin(dataset, {}, options);
   return dataset;
 }

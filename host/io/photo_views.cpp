@@ -70,6 +70,11 @@ Camera picture_camera(const Camera& photo, double factor, bool undistort) {
   return out;
 }
 
+void sort_by_name(std::vector<View>& views) {
+  std::stable_sort(views.begin(), views.end(),
+                   [](const View& a, const View& b) { return a.camera.name < b.camera.name; });
+}
+
 void leave_out_missing(std::size_t missing,
                        std::size_t all,
                        const std::string& what,

@@ -22,6 +22,8 @@ void set_cameras(View& view, const Camera& nominal, ImageSize photo, double fact
 /// size divided by `factor`, and with `undistort` a pinhole in the place of kOpenCv.
 Camera picture_camera(const Camera& photo, double factor, bool undistort);
 
+void sort_by_name(std::vector<View>& views);
+
 /// Poses without a photo, as those of blurred photos that were deleted, are left out with a
 /// warning; where most of `all` have none, it is the folder that is wrong: DataError with `advice`.
 void leave_out_missing(std::size_t missing,

@@ -190,8 +190,9 @@ std::vector<Camera> on_orbit(const SceneCamera& camera,
   OrbitOptions shape;
   shape.frames = camera.frames.value_or(frames);
   if (!camera.file.empty()) {
-    const std::vector<Camera> photos =
-        cameras_of(load_dataset(camera.file, camera.data_settings.over(trained)), Split::kAll);
+    DatasetOptions options = camera.data_settings.over(trained);
+    options.test_list.reset();  // all count, also of other data than the run's
+    const std::vector<Camera> photos = cameras_of(load_dataset(camera.file, options), Split::kAll);
     if (!camera.target) around.center = common_target(photos).value_or(extent.center);
     shape.up = camera.up.value_or(estimate_up(photos));
     shape = orbit_like(photos, around.center, shape);
@@ -246,6 +247,13 @@ SceneCamera read_scene_camera(io::TomlTable& table) {
     table.choice<Split>("split", camera.split,
                         {{"test", Split::kTest}, {"train", Split::kTrain}, {"all", Split::kAll}});
     read_data_row(table, "test-every", camera);
+    if (const auto list = table.existing("test-list")) {
+      if (camera.data_settings.has("test-every")) {
+        table.fail("test-list",
+                   "'test-every' and 'test-list' in [camera] contradict each other: leave one out");
+      }
+      camera.data_settings.set("test-list", {list->string()});
+    }
     read_data_row(table, "undistort", camera);
   } else {
     if (data) {
@@ -278,7 +286,7 @@ SceneCamera read_scene_camera(io::TomlTable& table) {
     }
   }
   const bool views = camera.source == Source::kData;
-  for (const char* key : {"split", "test-every", "undistort"})
+  for (const char* key : {"split", "test-every", "test-list", "undistort"})
     table.only_for(key, views, "the views of 'data'");
   table.only_for("views", views || file, "'file' and the views of 'data'");
   table.only_for("downscale", file || data, "'file' and 'data'");

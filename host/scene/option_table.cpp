@@ -37,11 +37,19 @@ const std::string& quotable(const std::string& key, const std::string& value) {
   return value;
 }
 
+// What toml_lines() has made a value of.
+std::optional<std::string> lines_of(const std::string& toml) {
+  const std::string begin = fmt::format("{}\n", kTomlLines);
+  if (!toml.starts_with(begin)) return std::nullopt;
+  return toml.substr(begin.size(), toml.size() - begin.size() - kTomlLines.size());
+}
+
 // What set() takes for the present value.
 std::vector<std::string> present_values(const OptionRow& row) {
   const std::string text = row.text();
   // Paths may hold what separates the items of other lists.
   if (row.list == OptionRow::List::kPaths) return option_items(row.name, {text});
+  if (const std::optional<std::string> lines = lines_of(text)) return {*lines};
   const bool quoted = text.size() > 1 && (text.front() == '"' || text.front() == '\'');
   return {quoted ? text.substr(1, text.size() - 2) : text};
 }
@@ -113,6 +121,19 @@ std::vector<std::string> option_items(const std::string& key,
 std::string toml_text(const std::string& text) {
   const char quote = text.find('\\') == std::string::npos ? '"' : '\'';
   return quote + text + quote;
+}
+
+std::string toml_lines(const std::string& text) {
+  return fmt::format("{0}\n{1}{0}", kTomlLines, text);
+}
+
+std::string brief_value(const std::string& toml) {
+  const std::optional<std::string> lines = lines_of(toml);
+  if (!lines) return toml;
+  std::size_t count = 0;
+  for (std::size_t at = 0; at < lines->size(); at = lines->find('\n', at) + 1)
+    count += (*lines)[at] == '#' ? 0 : 1;
+  return fmt::format("a list of {}", count);
 }
 
 void OptionTable::add(const std::string& name,

@@ -48,6 +48,13 @@ std::vector<std::string> option_items(const std::string& key,
 /// The text as TOML that needs no escapes.
 std::string toml_text(const std::string& text);
 
+/// What begins and ends a text of several lines in TOML, and is no part of one.
+constexpr std::string_view kTomlLines = "'''";
+/// A text of whole lines as TOML.
+std::string toml_lines(const std::string& text);
+/// A present value for a message: of a text of several lines how many they are, without comments.
+std::string brief_value(const std::string& toml);
+
 /// Collects options: every function adds one, bound to a member, which has to outlive the row.
 /// Name, range, default, help and setter of an option are told there and nowhere else.
 class OptionTable {

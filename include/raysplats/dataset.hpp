@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -87,6 +88,10 @@ struct DatasetOptions {
   /// COLMAP: images_N is used when it exists, the rest is resampled.
   double downscale = 0;
   int test_every = 8;  ///< every n-th view of a data set without a split of its own; 0 = none
+  /// Names of the photos that are held out, whatever test_every and the data set's own files say:
+  /// that of View::camera, the end of it that no other has, or a path that ends so, the extension
+  /// left out or not. What those files hold out besides is left out. No name = none is held out.
+  std::optional<std::set<std::string>> test_list = std::nullopt;
   /// true: photos through lenses with distortion (kOpenCv) become pinhole pictures; false: they
   /// keep their pixels and their model. Other models cannot become pinholes without loss and keep
   /// theirs either way; lenses that no ray knows (kPhotoLens) are taken out either way.
@@ -113,17 +118,22 @@ struct Dataset {
   bool alpha_is_background = false;  ///< RGBA is composited over the background (AlphaUse, or
                                      ///< MaskUse::kCutout), else alpha is a mask
   std::array<double, 3> origin{};    ///< what was taken off all positions of the files
-  int test_every = 0;  ///< every n-th view is held out; 0 = files name those, or none is
+  int test_every = 0;  ///< every n-th view is held out; 0 = a list or files name those, or none is
   std::optional<DatasetOptions> read_as;  ///< by load_dataset(), with the downscale it took
 
   /// Positions in `views` of those of a split, in their order.
   std::vector<std::size_t> indices(Split split) const;
 };
 
+/// The names of a text file that has one in each line, for DatasetOptions::test_list; empty lines
+/// and comments (#) are passed over. Throws DataError for a file that cannot be read.
+std::set<std::string> read_test_list(const std::filesystem::path& path);
+
 /// Detects the kind of data set (COLMAP, nerfstudio, Blender, LLFF, Polycam) and reads everything
 /// but the pixels. A transforms file is read itself, whatever lies beside it; those of Blender
 /// stand for their folder. Poses whose photos are missing are left out with a warning where most
 /// are there, and training views of photos that are held out too where these are few. Throws
+/// UsageError for names of DatasetOptions::test_list that mean no photo, or several, and
 /// DataError for a folder that is none, missing images, an unsupported camera model, no views, a
 /// mask of another shape than its photo.
 Dataset load_dataset(const std::filesystem::path& path, const DatasetOptions& options = {});

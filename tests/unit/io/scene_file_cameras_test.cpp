@@ -175,6 +175,13 @@ TEST_CASE("scene file: cameras count from the model's origin, data sets are as i
   const std::vector<Camera> more = cameras("data = 'data'\ndownscale = 2\ntest-every = 5\n");
   REQUIRE(more.size() == 2);
   CHECK(more[0].width == 20);
+  write_bytes(folder.scratch() / "list.txt", "photo 4\nphoto 9.png\n");
+  CHECK(cameras("data = 'data'\ntest-list = 'list.txt'\n").size() == 2);
+  CHECK(contains(message_of<UsageError>(
+                     [&] { cameras("data = 'data'\ntest-every = 5\ntest-list = 'list.txt'\n"); }),
+                 "contradict each other"));
+  trained.test_list = {"another.png"};
+  CHECK(cameras("data = 'data'\ntest-every = 5\n").size() == 2);
   const Camera on_orbit = cameras("data = 'data'\norbit = { frames = 1 }\n").at(0);
   CHECK(on_orbit.width == 10);
   CHECK(on_orbit.height == 8);
