@@ -55,7 +55,9 @@ glm::dvec3 vector_of(const std::string& text) {
 /// The views that a model is to be good for: those of a data set, or of its run.
 std::vector<Camera> views_of(const Options& options, const ModelSource& source) {
   if (options.data.empty()) return run_cameras(source);
-  return cameras_of(load_dataset(options.data, dataset_options(source)), Split::kAll);
+  DatasetOptions data = dataset_options(source);
+  data.test_list.reset();  // all count, also of other data than the run's
+  return cameras_of(load_dataset(options.data, data), Split::kAll);
 }
 
 std::vector<double> weights(const Options& options,

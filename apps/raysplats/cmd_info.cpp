@@ -72,9 +72,10 @@ void run(const Options& options) {
     other = describe_colmap(path);
   }
   const bool is_dataset = folder && !other && !is_model_folder(path);
-  if (!is_dataset && options.data.has("borders")) {
+  for (const char* flag : kPhotoFlags) {
+    if (is_dataset || !options.data.has(flag)) continue;
     throw UsageError(
-        fmt::format("--borders is about the photos of a data set, and {} is none", options.path));
+        fmt::format("--{} is about the photos of a data set, and {} is none", flag, options.path));
   }
   if (other) {
     (*other)["path"] = options.path;
@@ -110,7 +111,7 @@ Command add_info_command(CLI::App& app) {
       ->required()
       ->type_name("");
   command->add_flag("--json", options->json, "Print JSON");
-  add_borders_flag(*command, options->data);
+  add_photo_flags(*command, options->data);
   return {command, [options] { run(*options); }};
 }
 

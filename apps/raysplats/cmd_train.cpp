@@ -86,6 +86,7 @@ ChosenKeys check_choices(const CLI::App& command, Options& options) {
   if (!options.time.empty() && given("--iterations")) {
     throw UsageError("--time and --iterations contradict each other: leave one of them out");
   }
+  if (given("--test-every") && given("--test-list")) refuse_two_splits();
   return chosen;
 }
 

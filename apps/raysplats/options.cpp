@@ -140,13 +140,14 @@ CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags, const std::string& 
   app.add_option("--split", flags.split, split)
       ->group(group)
       ->check(one_of({"test", "train", "all"}));
-  for (const char* name : {"downscale", "test-every", "undistort", "masks", "alpha", "borders"})
+  for (const char* name :
+       {"downscale", "test-every", "test-list", "undistort", "masks", "alpha", "borders"})
     add_setting(app, flags.settings, name)->group(group);
   return data;
 }
 
-void add_borders_flag(CLI::App& app, DataSettings& settings) {
-  add_setting(app, settings, "borders");
+void add_photo_flags(CLI::App& app, DataSettings& settings) {
+  for (const char* name : kPhotoFlags) add_setting(app, settings, name);
 }
 
 Split DataFlags::chosen_split() const {
@@ -156,18 +157,18 @@ Split DataFlags::chosen_split() const {
 }
 
 void DataFlags::check_used(bool orbit) const {
-  const bool chosen = split || settings.has("test-every");
+  const bool chosen = split || settings.has("test-every") || settings.has("test-list");
   const bool about_photos = settings.has("undistort") || settings.has("masks") ||
                             settings.has("alpha") || settings.has("borders");
   if (data.empty() && (chosen || about_photos)) {
     throw UsageError(
-        "--split, --test-every, --undistort, --masks, --alpha and --borders are about the views of "
-        "a data set: add --data DATASET");
+        "--split, --test-every, --test-list, --undistort, --masks, --alpha and --borders are about "
+        "the views of a data set: add --data DATASET");
   }
   if (orbit && chosen) {
     throw UsageError(
-        "--split and --test-every choose views, but an orbit goes around all of them: leave them "
-        "out");
+        "--split, --test-every and --test-list choose views, but an orbit goes around all of them: "
+        "leave them out");
   }
   if (orbit && data.empty() && settings.has("downscale")) {
     throw UsageError(

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -74,8 +75,9 @@ CLI::Option* add_data_flags(CLI::App& app,
                             DataFlags& flags,
                             const std::string& split = "test (default), train or all");
 DataError no_views(const DataFlags& flags);
-/// --borders, for commands that say what a data set is.
-void add_borders_flag(CLI::App& app, DataSettings& settings);
+/// Which photos are held out, and what of them counts, for commands that say what a data set is.
+inline constexpr std::array kPhotoFlags{"test-every", "test-list", "borders"};
+void add_photo_flags(CLI::App& app, DataSettings& settings);
 
 /// --overwrite: outputs may take the place of what is there. `help` says of what.
 void add_overwrite_flag(

@@ -183,9 +183,13 @@ void check_fitted_end(const LearningRate& rate) {
   check_rate({rate.initial, rate.final_value == kFitted ? rate.initial : rate.final_value});
 }
 
-// Whether the command line has an option of that name.
+// Whether the command line has an option of that name, or one that says the same in another way: a
+// list of test photos in a file would go before the number there.
 std::function<bool(const std::string&)> given_on(const CLI::App& app) {
-  return [&app](const std::string& key) { return app.get_option("--" + key)->count() > 0; };
+  return [&app](const std::string& key) {
+    const auto given = [&](const std::string& name) { return app.get_option(name)->count() > 0; };
+    return given("--" + key) || (key == "test-list" && given("--test-every"));
+  };
 }
 
 // Sets the keys of --config that are not on the command line and not in `chosen`. Returns the names
@@ -237,7 +241,8 @@ std::string changes(TrainOptions before, TrainOptions after, const std::set<std:
     const bool fitted = is == toml_text("auto") || (are[i].name == "color-range" && is == "0") ||
                         (are[i].name == "iterations" && after.iterations == kFittedLength);
     if (was != is && !fitted && !anew.contains(are[i].name))
-      out += fmt::format("{}{} {} ({})", out.empty() ? "" : ", ", are[i].name, is, was);
+      out += fmt::format("{}{} {} ({})", out.empty() ? "" : ", ", are[i].name, brief_value(is),
+                         brief_value(was));
   }
   return out;
 }

@@ -68,7 +68,7 @@ DatasetOptions data_options(DatasetOptions said, const Dataset& dataset) {
     throw UsageError(fmt::format(
         "The options of the run say '{}' = {}, and its data set was read with {}: read it with the "
         "same, or leave that option out",
-        of_said[i].name, text, of_read[i].text()));
+        of_said[i].name, brief_value(text), brief_value(of_read[i].text())));
   }
   return read;
 }
@@ -181,10 +181,12 @@ void Trainer::Impl::check_views_and_options() const {
         "it at auto, or choose 'masks' = ignore and 'alpha' = ignore");
   }
   if (train_views.empty()) {
+    const bool by_list = options.data.test_list && !test_views.empty();
     const bool by_option = options.data.test_every == 1 && !test_views.empty();
     throw UsageError(fmt::format(
         "The data set {} has no training views: {}", dataset.root.string(),
-        by_option             ? "--test-every 1 holds all of them out"
+        by_list               ? "the list of test photos names all of them"
+        : by_option           ? "--test-every 1 holds all of them out"
         : !test_views.empty() ? "its files hold all of them out; let them name some for training"
                               : "its files name none to train on"));
   }

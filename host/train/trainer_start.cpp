@@ -359,7 +359,8 @@ void Trainer::Impl::start() {
         1.0 / extent, extent);
   }
   if (test_views.empty()) {
-    const bool by_option = options.data.test_every == 0 && dataset.views.size() > 1;
+    const bool by_option =
+        (options.data.test_every == 0 || options.data.test_list) && dataset.views.size() > 1;
     spdlog::info("no view is held out, so nothing is measured{}",
                  by_option ? ": --test-every 8 holds some out" : "");
   }

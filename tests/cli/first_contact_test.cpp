@@ -130,6 +130,50 @@ TEST_CASE("a run is resumed with the photos that it was trained on") {
   succeed(training(run, 4) + Words{"--resume", run});
 }
 
+TEST_CASE("a run holds out what its list names, whatever becomes of the file") {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run", list = folder / "list.txt";
+  const auto held_out = [&](const Words& more) {
+    const std::string out = folder / "eval";
+    succeed(Words{"eval", run, "--data", data(), "-o", out, "--overwrite", "-q"} + more);
+    std::vector<std::string> names;
+    const auto metrics = nlohmann::json::parse(read_file(out + "/metrics.json"));
+    for (const auto& image : metrics.at("images")) names.push_back(image.at("name"));
+    return names;
+  };
+  write_file(list, "# published\nr_1.png\ntrain/r_2\n");
+  const Words listed = Words{"--test-list", list};
+  check_refused(training(run, 2) + listed, 2, "1 of 2 names");
+  write_file(list, "# published\ntest/r_1.png\ntrain/r_2\n");
+  succeed(training(run, 2) + listed);
+  CHECK(contains(read_file(run + "/config.toml"),
+                 "\ntest-list = '''\ntest/r_1.png\ntrain/r_2\n'''\n"));
+  write_file(list, "test/r_1.png\n");
+  succeed(training(run, 4) + Words{"--resume", run});
+  CHECK(held_out({}) == std::vector<std::string>{"test/r_1.png", "train/r_2.png"});
+  CHECK(held_out(listed) == std::vector<std::string>{"test/r_1.png"});
+  CHECK(held_out({"--test-every", "8"}) ==
+        std::vector<std::string>{"test/r_0.png", "test/r_1.png"});
+  check_refused(training(run, 6) + Words{"--resume", run} + listed, 2, "other photos held out");
+  write_file(list, "r_2.png\ntest/r_1\n");
+  succeed(training(run, 6) + Words{"--resume", run} + listed);
+  check_refused(training(run, 8) + Words{"--resume", run, "--test-every", "8"}, 2,
+                "other photos held out");
+
+  const std::string other = folder / "other";
+  for (const Words& command : {training(other, 2), Words{"info", data()},
+                               Words{"eval", run, "--data", data(), "-o", other}})
+    check_refused(command + listed + Words{"--test-every", "4"}, 2, "contradict each other");
+  check_refused({"render", run, "-o", other, "--orbit", "2", "--test-list", list}, 2, "--data");
+  CHECK(contains(succeed(Words{"info", data()} + listed).out, "4: 2 to train, 2 to test"));
+  check_refused(Words{"info", run} + listed, 2, "--test-list is about");
+  write_file(list, "");
+  CHECK(contains(succeed(Words{"info", data()} + listed).out, "3: 3 to train, 0 to test"));
+  write_file(list, "r_2\ntrain/r_0\ntrain/r_1\ntest/r_0\ntest/r_1\n");
+  check_refused(training(other, 2) + listed, 2, "the list of test photos names all of them");
+  CHECK_FALSE(fs::exists(other));
+}
+
 TEST_CASE("a run that is resumed at or beyond its end writes what it reports") {
   const TemporaryFolder folder;
   const std::string run = folder / "run";
