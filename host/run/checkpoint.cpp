@@ -94,6 +94,7 @@ nlohmann::json header_of(const Checkpoint& c) {
           {"scale_activation", c.scale_activation},
           {"scene_extent", c.scene_extent},
           {"dataset", c.dataset},
+          {"split", c.split},
           {"bad_steps", c.bad_steps},
           {"bad_steps_in_a_row", c.bad_steps_in_a_row},
           {"traced_rays", c.traced_rays},
@@ -143,6 +144,7 @@ Checkpoint parse_header(const std::string& text, std::uint32_t version) {
     get_whole<std::int64_t>(json, "mean_since", 0, kMaxIterations, c.mean_since);
   if (json.contains("views_joined"))
     get_whole<std::int64_t>(json, "views_joined", 0, kMaxIterations, c.views_joined);
+  if (json.contains("split")) json.at("split").get_to(c.split);
   if (json.contains("pass_due")) json.at("pass_due").get_to(c.pass_due);
   json.at("config").get_to(c.config);
   return c;

@@ -27,6 +27,7 @@ struct Checkpoint {
   std::string scale_activation;  ///< "exp" or "sigmoid"
   double scene_extent = 0;
   std::string dataset;          ///< dataset_fingerprint(); empty in files of version 1
+  std::string split;            ///< split_fingerprint(); empty in older files
   std::uint32_t bad_steps = 0;  ///< StepGuard::Counts
   std::uint32_t bad_steps_in_a_row = 0;
   std::uint64_t traced_rays = 0;  ///< of all training views so far; 0 in older files, as the next

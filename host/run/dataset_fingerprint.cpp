@@ -53,6 +53,17 @@ std::string description(const View& view, bool with_depths) {
 
 }  // namespace
 
+std::string split_fingerprint(const Dataset& dataset) {
+  std::vector<std::string> names;
+  for (const View& view : dataset.views) {
+    if (view.test) names.push_back(view.camera.name);
+  }
+  std::sort(names.begin(), names.end());
+  std::string text;
+  for (const std::string& name : names) text += name + "\n";
+  return fmt::format("{:016x}", XXH64(text.data(), text.size(), 0));
+}
+
 std::string dataset_fingerprint(const Dataset& dataset, bool with_depths) {
   // The order of the views depends on the split.
   std::vector<std::string> lines;

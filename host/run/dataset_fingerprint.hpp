@@ -13,4 +13,7 @@ namespace raysplats {
 /// read. Throws DataError for a depth map that cannot be read.
 std::string dataset_fingerprint(const Dataset& dataset, bool with_depths = false);
 
+/// The same of the names of the photos that are held out.
+std::string split_fingerprint(const Dataset& dataset);
+
 }  // namespace raysplats

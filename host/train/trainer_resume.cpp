@@ -28,7 +28,8 @@ std::string fingerprint_for(const std::string& config, const Dataset& dataset) {
 
 // What decides which photos a run has, and what of them counts.
 auto reading(const DatasetOptions& o) {
-  return std::tuple(o.factor(), o.test_every, o.undistort, o.masks, o.alpha);
+  return std::tuple(o.factor(), o.test_list ? 0 : o.test_every, o.test_list, o.undistort, o.masks,
+                    o.alpha);
 }
 
 }  // namespace
@@ -40,6 +41,7 @@ void Trainer::Impl::write_state(const std::filesystem::path& path) {
   checkpoint.seed = options.seed;
   checkpoint.scene_extent = extent;
   checkpoint.dataset = fingerprint;
+  checkpoint.split = split_fingerprint(dataset);
   checkpoint.config = to_toml(options);
   const StepGuard::Counts counts = guard.counts();
   checkpoint.bad_steps = counts.bad_steps;
@@ -139,7 +141,18 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
         checkpoint.iteration, option, was, is));
   };
   differs("downscale", before.data.factor(), now.data.factor());
-  differs("test-every", before.data.test_every, now.data.test_every);
+  if (!before.data.test_list && !now.data.test_list)
+    differs("test-every", before.data.test_every, now.data.test_every);
+  if (!checkpoint.split.empty() && checkpoint.split != split_fingerprint(dataset)) {
+    const bool by_list = before.data.test_list != now.data.test_list;
+    throw UsageError(
+        fmt::format("The checkpoint of iteration {} was made with other photos held out than {} "
+                    "now: {}, or start a new run with --init",
+                    checkpoint.iteration,
+                    by_list ? "'test-list' says" : "the files of " + dataset.root.string() + " say",
+                    by_list ? "leave that to the run's configuration, which has their names"
+                            : "bring their lists back, or name the photos by --test-list"));
+  }
   differs("undistort", before.data.undistort, now.data.undistort);
   differs("validate-views", before.validate_views, now.validate_views);
   differs("exposure", before.exposure, now.exposure);

@@ -29,6 +29,7 @@ Checkpoint sample(std::int64_t iteration) {
   c.scale_activation = "exp";
   c.scene_extent = 0.1 + 0.2;
   c.dataset = "0123456789abcdef";
+  c.split = "fedcba9876543210";
   c.bad_steps = 4;
   c.bad_steps_in_a_row = 2;
   c.skipped_updates = 11;
@@ -59,6 +60,7 @@ TEST_CASE("a checkpoint comes back bit for bit") {
   CHECK(read.scale_activation == "exp");
   CHECK(read.scene_extent == c.scene_extent);
   CHECK(read.dataset == c.dataset);
+  CHECK(read.split == c.split);
   CHECK(read.bad_steps == 4);
   CHECK(read.bad_steps_in_a_row == 2);
   CHECK(read.skipped_updates == 11);

@@ -425,6 +425,22 @@ TEST_CASE("a run says how its data set was read, and options that say otherwise 
                  "say 'downscale' = 4, and its data set was read with 2: read it with the same"));
 }
 
+TEST_CASE("a run is not resumed where files of its data set hold out other photos than before") {
+  const Place place;
+  place.trainer(growing(), "run")->run(false);
+  CHECK_FALSE(load_latest_checkpoint(place.run("run")).split.empty());
+  Dataset data = load_dataset(place.folder / "data");
+  const auto resume = [&] {
+    Trainer(shared_test_context(), data, growing(), place.run("run")).resume("latest");
+  };
+  resume();
+  View& other = data.views[data.indices(Split::kTrain).front()];
+  other.test = true;
+  CHECK(contains(message_of<UsageError>(resume), "bring their lists back"));
+  data.read_as->test_list = {other.camera.name};
+  CHECK(contains(message_of<UsageError>(resume), "leave that to the run's configuration"));
+}
+
 TEST_CASE("a run that does not say how its data set was read goes on, and is warned of") {
   const Place place;
   DatasetOptions smaller;
