@@ -25,13 +25,20 @@ def options(iterations):
     )
 
 
-def test_dataset(folder):
+def test_dataset(folder, tmp_path):
     dataset = rs.Dataset.load(folder)
     assert dataset.kind == "nerfstudio" and len(dataset) == 16
     test = dataset.indices("test")
     assert test == [i for i, view in enumerate(dataset.views) if view.test] and len(test) == 2
     view = dataset.views[test[0]]
     assert view.picture().shape == (40, 48, 4) and view.camera.width == 48
+    names = [dataset.views[i].camera.name for i in (1, 4)]
+    listed = rs.Dataset.load(folder, test_list=names)
+    assert [listed.views[i].camera.name for i in listed.indices("test")] == names and listed.test_every == 0
+    (tmp_path / "list.txt").write_text("\n".join(names))
+    assert rs.Dataset.load(folder, test_list=tmp_path / "list.txt").indices("test") == listed.indices("test")
+    with pytest.raises(rs.UsageError, match="1 of 1 names"):
+        rs.Dataset.load(folder, test_list=["none.png"])
     with pytest.raises(rs.UsageError, match="split is 'train', 'test' or 'all'"):
         dataset.indices("val")
 

@@ -2,17 +2,21 @@
 #include <fmt/format.h>
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/set.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
+#include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
 #include <array>
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <tuple>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "bindings.hpp"
@@ -28,6 +32,7 @@ namespace {
 /// The arguments of Dataset.load() in their order, as DatasetOptions.
 using OptionsState = std::tuple<double,
                                 int,
+                                std::optional<std::set<std::string>>,
                                 bool,
                                 std::string,
                                 std::string,
@@ -35,10 +40,11 @@ using OptionsState = std::tuple<double,
                                 std::optional<std::array<double, 3>>>;
 
 DatasetOptions options_of(const OptionsState& state) {
-  const auto& [downscale, test_every, undistort, masks, alpha, borders, origin] = state;
+  const auto& [downscale, test_every, test_list, undistort, masks, alpha, borders, origin] = state;
   DatasetOptions options;
   options.downscale = downscale;
   options.test_every = test_every;
+  options.test_list = test_list;
   options.undistort = undistort;
   options.masks = value_of(kMaskUses, "masks", masks);
   options.alpha = value_of(kAlphaUses, "alpha", alpha);
@@ -50,20 +56,32 @@ DatasetOptions options_of(const OptionsState& state) {
 std::optional<OptionsState> options_state(const Dataset& dataset) {
   if (!dataset.read_as) return std::nullopt;
   const DatasetOptions& o = *dataset.read_as;
-  return OptionsState(o.downscale, o.test_every, o.undistort, name_of(kMaskUses, o.masks),
-                      name_of(kAlphaUses, o.alpha), name_of(kBorderUses, o.borders), o.origin);
+  return OptionsState(o.downscale, o.test_every, o.test_list, o.undistort,
+                      name_of(kMaskUses, o.masks), name_of(kAlphaUses, o.alpha),
+                      name_of(kBorderUses, o.borders), o.origin);
+}
+
+/// A file of names, or the names themselves.
+using TestList = std::optional<std::variant<std::filesystem::path, std::vector<std::string>>>;
+
+std::optional<std::set<std::string>> names_of(const TestList& list) {
+  if (!list) return std::nullopt;
+  if (const auto* file = std::get_if<std::filesystem::path>(&*list)) return read_test_list(*file);
+  const auto& names = std::get<std::vector<std::string>>(*list);
+  return std::set<std::string>(names.begin(), names.end());
 }
 
 Dataset load(const std::filesystem::path& path,
              double downscale,
              int test_every,
+             const TestList& test_list,
              bool undistort,
              const std::string& masks,
              const std::string& alpha,
              const std::string& borders,
              const std::optional<std::array<double, 3>>& origin) {
-  return load_dataset(
-      path, options_of({downscale, test_every, undistort, masks, alpha, borders, origin}));
+  return load_dataset(path, options_of({downscale, test_every, names_of(test_list), undistort,
+                                        masks, alpha, borders, origin}));
 }
 
 FloatView picture(const View& self) {
@@ -187,16 +205,18 @@ void bind_datasets(nb::module_& module) {
   nb::class_<Dataset>(module, "Dataset", "Photos, cameras and points of one scene.")
       .def_static(
           "load", &load, nb::arg("path"), nb::kw_only(), nb::arg("downscale") = 1.0,
-          nb::arg("test_every") = 8, nb::arg("undistort") = true, nb::arg("masks") = "ignore",
-          nb::arg("alpha") = "auto", nb::arg("borders") = "auto", nb::arg("origin") = nb::none(),
-          nb::call_guard<nb::gil_scoped_release>(),
-          "Reads a COLMAP, nerfstudio, Blender, LLFF or Polycam folder, everything but the pixels.")
+          nb::arg("test_every") = 8, nb::arg("test_list") = nb::none(), nb::arg("undistort") = true,
+          nb::arg("masks") = "ignore", nb::arg("alpha") = "auto", nb::arg("borders") = "auto",
+          nb::arg("origin") = nb::none(), nb::call_guard<nb::gil_scoped_release>(),
+          "Reads a COLMAP, nerfstudio, Blender, LLFF or Polycam folder, everything but the pixels. "
+          "test_list: names of the photos that are held out, or a file of them, in place of those "
+          "that test_every and files of the data set say.")
       .def_prop_ro(
           "kind", [](const Dataset& self) { return name_of(kDatasetKinds, self.kind); },
           "'colmap', 'blender', 'nerfstudio', 'llff' or 'polycam'.")
       .def_ro("root", &Dataset::root)
       .def_ro("test_every", &Dataset::test_every,
-              "Every n-th view is held out; 0 where files name those, or none is.")
+              "Every n-th view is held out; 0 where a list or files name those, or none is.")
       .def_ro("origin", &Dataset::origin,
               "What was taken off all positions of the files: 0, but near the cameras where the "
               "scene lies far away.")
