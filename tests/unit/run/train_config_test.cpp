@@ -61,12 +61,14 @@ TEST_CASE("the configuration written is the configuration read") {
   options.trace.adaptive_radius = false;
   options.adam_epsilon = 1e-15;
   options.seed = 12345678901234567890ull;
+  options.data.test_list = {"a b.png", "left/it's \"1\".png", "#2.png", "seed = 3"};
   const auto path = temporary("round.toml");
   write_text_file(path, to_toml(options));
   TrainOptions read;
   read_train_config(path, read);
   CHECK(to_toml(read) == to_toml(options));
   CHECK(read.seed == options.seed);
+  CHECK(read.data.test_list == options.data.test_list);
   CHECK(read.eval_at.empty());
   CHECK(read.save_at == options.save_at);
   CHECK(read.position_lr.final_value == options.position_lr.final_value);
