@@ -126,6 +126,7 @@ struct Trainer::Impl {
   MemoryDemand demand(std::size_t count) const;
   void check_room(std::size_t count, std::size_t most) const;
   void choose_background();
+  void warn_of_photos();
   void choose_color_range();
   void reset_exposure();
   void reset_sky();

@@ -14,6 +14,8 @@
 #include "scene/morton_order.hpp"
 #include "scene/pixel_count.hpp"
 #include "train/flat_start.hpp"
+#include "train/grey_photos.hpp"
+#include "train/mask_check.hpp"
 #include "train/memory_estimate.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
@@ -32,6 +34,7 @@ constexpr double kSigmoidExtent = 20;    // then one unit is less than 0.05 exte
 constexpr double kPosePrior = 1;         // PoseRefinement: what errors of half a degree can bear
 constexpr std::size_t kSomePhotos = 24;  // that tell what is typical of all
 constexpr std::size_t kManyPhotos = 100;  // that tell of depth
+constexpr std::size_t kNamed = 3;         // photos that a warning is about
 constexpr double kLeastShown = 0.01;      // of the photos, for a start to be without a reason
 
 std::vector<std::size_t> evenly_spread(const std::vector<std::size_t>& all, std::size_t most) {
@@ -70,6 +73,37 @@ void warn_of_one_direction(const Dataset& dataset,
       "the same lens of a rig?): the model lacks what they show, and metrics judge it there alone; "
       "--test-every {} holds out photos of other lenses as well",
       held_out.size(), dataset.test_every, better);
+}
+
+// `read`: of so many photos of the run.
+void warn_of_grey_photos(std::span<const SmallPhoto> read, std::size_t all) {
+  const std::vector<std::size_t> grey = grey_photos(read);
+  if (grey.empty()) return;
+  std::string names;
+  for (const std::size_t i : even_choice(grey.size(), kNamed))
+    names += (names.empty() ? "" : ", ") + read[grey[i]].camera.name;
+  spdlog::warn(
+      "{} of {} {} photos have no colour where others show some, {} among them: grey is learned "
+      "from these, so give them with their colours or take them out of the data set",
+      grey.size(), read.size(), all > read.size() ? "looked-at" : "training", names);
+}
+
+void warn_of_inverted_masks(const Dataset& dataset, const MaskedOut& masked) {
+  spdlog::debug(
+      "masks leave out {:.1f} % of {} places of sparse points, {:.1f} % of the pixels, {:.1f} % of "
+      "the edges, and photos agree on {:.1f} % of what they keep",
+      100 * masked.points, masked.seen, 100 * masked.pixels, 100 * masked.edge,
+      100 * masked.agreed);
+  if (!masked.inverted()) return;
+  const bool told = masked.points > 0;
+  const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
+  const auto first = std::find_if(dataset.views.begin(), dataset.views.end(), has_mask);
+  spdlog::warn(
+      "the masks, {} among them, seem to be inverted: they leave out {:.0f} % of {}; what is black "
+      "in a mask does not count, so give masks that are black where photos are to be left out",
+      first->mask_path.string(), 100 * (told ? masked.points : masked.pixels),
+      told ? "the places where photos show sparse points"
+           : "the photos, and what they keep lies elsewhere in each");
 }
 
 // A length is the user's to choose, and that of a run by time nobody knows beforehand.
@@ -274,6 +308,15 @@ void Trainer::Impl::require_depth_gradients() const {
   }
 }
 
+// What photos that were read for the start tell of faults of the capture: as many as there are.
+void Trainer::Impl::warn_of_photos() {
+  photos(PhotoChoice::kSome);
+  const auto& [count, read] = *small_photos.rbegin();
+  const std::vector<std::size_t> views = evenly_spread(first_views(), count);
+  warn_of_grey_photos(read, views.size());
+  warn_of_inverted_masks(dataset, masked_out(dataset, read, views, options.seed));
+}
+
 // A model to start from, with at most that many Gaussians. Points in random places need no photo
 // that shows them, but training does. Some photos tell that as a rule, without the others.
 Gaussians Trainer::Impl::new_model(std::size_t most) {
@@ -338,6 +381,7 @@ void Trainer::Impl::start() {
     upload_first_model(most);
     choose_background();
     choose_color_range();
+    warn_of_photos();
   }
   small_photos.clear();
   warn_of_strays(train_cameras);

@@ -91,3 +91,41 @@ TEST_CASE("a run says which of its options change nothing, and that it never gro
   options.densify_until = 0;  // none is wanted
   CHECK_FALSE(capture.says("never grows", options));
 }
+
+TEST_CASE("a run is warned of photos without colour among coloured ones, and names some") {
+  Capture capture(ring(8, 3.0, {0, 0, 0}));
+  capture.hold_out(0);
+  const std::string warning = "have no colour where others show some, view_2.png, view_5.png among";
+  const TrainOptions options = short_training(8);
+  CHECK_FALSE(capture.says("no colour", options));
+  for (const std::size_t i : {2, 5}) {
+    const std::filesystem::path& path = capture.dataset.views[i].image_path;
+    Image photo = read_image(path);
+    for (std::size_t p = 0; p < photo.pixels(); ++p) {
+      float* pixel = photo.data.data() + 3 * p;
+      pixel[0] = pixel[1] = pixel[2] = (pixel[0] + pixel[1] + pixel[2]) / 3;
+    }
+    write_image(path, photo);
+  }
+  CHECK(capture.says("2 of 8 training photos " + warning, options));
+}
+
+TEST_CASE("a run is warned of masks that keep what they should leave out, and names one") {
+  Capture capture(ring(8, 3.0, {0, 0, 0}));
+  capture.hold_out(0);
+  const TrainOptions options = short_training(8);
+  for (const bool inverted : {false, true}) {
+    for (std::size_t i = 0; i < 8; ++i) {
+      // Somebody who stands elsewhere in each photo.
+      Image mask(100, 80, 1, inverted ? 0.0f : 1.0f);
+      for (int y = 20; y < 60; ++y) {
+        for (int x = 0; x < 12; ++x)
+          mask.at(x + 12 * static_cast<int>((3 * i) % 7), y, 0) = inverted ? 1.0f : 0.0f;
+      }
+      View& view = capture.dataset.views[i];
+      view.mask_path = capture.folder / ("mask_" + std::to_string(i) + ".png");
+      write_image(view.mask_path, mask);
+    }
+    CHECK(capture.says("mask_0.png among them, seem to be inverted", options) == inverted);
+  }
+}
