@@ -18,6 +18,7 @@
 #include "train/mask_check.hpp"
 #include "train/memory_estimate.hpp"
 #include "train/step_options.hpp"
+#include "train/still_marks.hpp"
 #include "train/trainer_impl.hpp"
 #include "train/unused_options.hpp"
 #include "util/file_kind.hpp"
@@ -89,6 +90,7 @@ void warn_of_grey_photos(std::span<const SmallPhoto> read, std::size_t all) {
 }
 
 void warn_of_inverted_masks(const Dataset& dataset, const MaskedOut& masked) {
+  if (masked.photos == 0) return;
   spdlog::debug(
       "masks leave out {:.1f} % of {} places of sparse points, {:.1f} % of the pixels, {:.1f} % of "
       "the edges, and photos agree on {:.1f} % of what they keep",
@@ -104,6 +106,39 @@ void warn_of_inverted_masks(const Dataset& dataset, const MaskedOut& masked) {
       first->mask_path.string(), 100 * (told ? masked.points : masked.pixels),
       told ? "the places where photos show sparse points"
            : "the photos, and what they keep lies elsewhere in each");
+}
+
+// Photos of the size at which marks are looked for, however small the run has them.
+std::vector<SmallPhoto> photos_for_marks(const Dataset& dataset,
+                                         std::span<const std::size_t> views) {
+  Dataset chosen;
+  std::vector<std::size_t> all;
+  for (const std::size_t i : views) {
+    View view = dataset.views[i];
+    const Camera& source = view.source_camera;
+    const int side = std::max(view.camera.width, view.camera.height);
+    const int most = std::min(kMarkSide, std::max(source.width, source.height));
+    if (side < most) view.camera = downscaled(view.camera, static_cast<double>(side) / most);
+    all.push_back(all.size());
+    chosen.views.push_back(std::move(view));
+  }
+  return load_small_photos(chosen, all, kMarkSide);
+}
+
+void warn_of_marks(std::span<const SmallPhoto> read) {
+  const std::vector<StillMark> marks = still_marks(read);
+  if (marks.empty()) return;
+  const StillMark& mark = marks.front();
+  const glm::dvec2 size(read.front().camera.width, read.front().camera.height);
+  const glm::dvec2 low = 100.0 * glm::dvec2(mark.low) / size;
+  const glm::dvec2 high = 100.0 * glm::dvec2(mark.high + 1) / size;
+  spdlog::warn(
+      "something stands at the same pixels of all photos, as a logo, a date or what does not turn "
+      "with a turntable: {}from {:.0f} to {:.0f} % of their width and from {:.0f} to {:.0f} % of "
+      "their height (from the top left); it is learned as a part of the scene, so crop it off, or "
+      "leave it out by masks that are black there",
+      marks.size() > 1 ? fmt::format("in {} places, the clearest ", marks.size()) : "", low.x,
+      high.x, low.y, high.y);
 }
 
 // A length is the user's to choose, and that of a run by time nobody knows beforehand.
@@ -314,6 +349,7 @@ void Trainer::Impl::warn_of_photos() {
   const auto& [count, read] = *small_photos.rbegin();
   const std::vector<std::size_t> views = evenly_spread(first_views(), count);
   warn_of_grey_photos(read, views.size());
+  warn_of_marks(photos_for_marks(dataset, evenly_spread(first_views(), kMarkPhotos)));
   warn_of_inverted_masks(dataset, masked_out(dataset, read, views, options.seed));
 }
 

@@ -129,3 +129,22 @@ TEST_CASE("a run is warned of masks that keep what they should leave out, and na
     CHECK(capture.says("mask_0.png among them, seem to be inverted", options) == inverted);
   }
 }
+
+TEST_CASE("a run is warned of what stands at the same pixels of all photos, and says where") {
+  Capture capture(ring(16, 3.0, {0, 0, 0}));
+  capture.hold_out(0);
+  const TrainOptions options = short_training(16);
+  CHECK_FALSE(capture.says("same pixels", options));
+  for (const View& view : capture.dataset.views) {
+    Image photo = read_image(view.image_path);
+    for (int y = 80; y < 90; ++y) {
+      for (int x = 55; x < 75; ++x) {
+        for (int c = 0; c < 3; ++c) photo.at(x, y, c) = (x / 3 + y / 3) % 2 == 0 ? 1.0f : 0.0f;
+      }
+    }
+    write_image(view.image_path, photo);
+  }
+  CHECK(capture.says("at the same pixels of all photos", options));
+  CHECK(
+      capture.says("from 68 to 95 % of their width and from 79 to 91 % of their height", options));
+}

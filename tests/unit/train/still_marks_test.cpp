@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/still_marks.hpp"
+
+#include <doctest/doctest.h>
+
+#include <cmath>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <vector>
+
+#include "unit/train/test_photos.hpp"
+
+using namespace raysplats;
+using namespace raysplats::test;
+
+namespace {
+
+constexpr int kWidth = 400, kHeight = 300;
+
+// What a pixel of a photo shows.
+using Shows = std::function<glm::dvec4(const CameraRay&, int x, int y)>;
+
+glm::dvec4 pattern(const CameraRay& ray, int, int) {
+  const glm::dvec3 d = ray.direction;
+  return {0.5 + 0.3 * std::sin(19 * d.x + 3 * d.z), 0.5 + 0.3 * std::cos(17 * d.y - 5 * d.x),
+          0.5 + 0.3 * std::sin(23 * d.z + 7 * d.y), 1};
+}
+
+// Letters, 12 pixels high, from (300, 270) on.
+bool is_letter(int x, int y) {
+  if (x < 300 || x >= 360 || y < 270 || y >= 282) return false;
+  const int u = (x - 300) % 10, v = y - 270;
+  return u < 2 || (u < 7 && (v < 2 || v >= 10));
+}
+
+glm::dvec4 dated(const CameraRay& ray, int x, int y) {
+  return is_letter(x, y) ? glm::dvec4(1, 1, 1, 1) : pattern(ray, x, y);
+}
+
+std::vector<Camera> around(int count) {
+  std::vector<Camera> cameras;
+  for (int i = 0; i < count; ++i) {
+    const double angle = 6.283 * i / count;
+    cameras.push_back(look_at({3 * std::cos(angle), 3 * std::sin(angle), 1.2}, {0, 0, 0}, {0, 0, 1},
+                              kWidth, kHeight, 400));
+  }
+  return cameras;
+}
+
+std::vector<StillMark> found(const std::vector<Camera>& cameras, const Shows& shows) {
+  std::vector<SmallPhoto> photos;
+  for (const Camera& camera : cameras) {
+    int pixel = 0;
+    photos.push_back(photo_of(camera, [&](const CameraRay& ray) {
+      const int x = pixel % kWidth, y = pixel / kWidth;
+      ++pixel;
+      return shows(ray, x, y);
+    }));
+  }
+  return still_marks(photos);
+}
+
+}  // namespace
+
+TEST_CASE("a date that all photos have at the same pixels is a mark, and a scene has none") {
+  const std::vector<StillMark> marks = found(around(16), dated);
+  REQUIRE(marks.size() == 1);
+  CHECK(std::abs(marks[0].low.x - 300) <= 1);
+  CHECK(std::abs(marks[0].high.x - 357) <= 2);
+  CHECK(std::abs(marks[0].low.y - 270) <= 1);
+  CHECK(std::abs(marks[0].high.y - 281) <= 1);
+  CHECK(found(around(16), pattern).empty());
+}
+
+TEST_CASE("few photos, and those whose masks leave a mark out, tell of none") {
+  CHECK(found(around(11), dated).empty());
+  CHECK(found(around(16), [](const CameraRay& ray, int x, int y) {
+          const bool masked = x > 295 && x < 365 && y > 265 && y < 287;
+          return glm::dvec4(glm::dvec3(dated(ray, x, y)), masked ? 0 : 1);
+        }).empty());
+}
+
+TEST_CASE(
+    "what all cameras look at, and what is far away from those that do not turn, is no mark") {
+  // A white ball in the middle of an orbit.
+  CHECK(found(around(16), [](const CameraRay& ray, int x, int y) {
+          const bool ball = glm::length(glm::cross(ray.direction, -ray.origin)) < 0.15;
+          return ball ? glm::dvec4(1, 1, 1, 1) : pattern(ray, x, y);
+        }).empty());
+  std::vector<Camera> row;
+  for (int i = 0; i < 16; ++i) {
+    const double y = 0.1 * i;
+    row.push_back(look_at({0, y, 0}, {4, y, 0}, {0, 0, 1}, kWidth, kHeight, 400));
+  }
+  CHECK(found(row, [](const CameraRay& ray, int x, int y) {
+          if (is_letter(x, y)) return glm::dvec4(1, 1, 1, 1);
+          const double t = (4.0 - ray.origin.x) / ray.direction.x;
+          const glm::dvec3 near = ray.origin + t * ray.direction;
+          return pattern({{}, glm::dvec3(1, near.y, near.z), true}, x, y);
+        }).empty());
+}
+
+TEST_CASE("a ground that stays where it is behind a turntable is no small mark") {
+  CHECK(found(around(16), [](const CameraRay& ray, int x, int y) {
+          const bool ground = y < 120;
+          const double wave = 0.5 + 0.4 * std::sin(0.3 * x) * std::sin(0.3 * y);
+          return ground ? glm::dvec4(wave, wave, wave, 1) : pattern(ray, x, y);
+        }).empty());
+  // Nor is one of one colour.
+  CHECK(found(around(16), [](const CameraRay& ray, int x, int y) {
+          return y < 120 ? glm::dvec4(1, 1, 1, 1) : pattern(ray, x, y);
+        }).empty());
+}
