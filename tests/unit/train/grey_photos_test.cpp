@@ -32,6 +32,7 @@ glm::dvec4 grey(int photo, const CameraRay& ray) {
 Numbers found(const Shows& shows) {
   const std::vector<Camera> cameras = ring(12, 3.0, {0, 0, 0});
   std::vector<SmallPhoto> photos;
+  photos.reserve(cameras.size());
   for (int i = 0; i < 12; ++i) {
     photos.push_back(photo_of(cameras[static_cast<std::size_t>(i)],
                               [&](const CameraRay& ray) { return shows(i, ray); }));
