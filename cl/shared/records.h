@@ -71,6 +71,7 @@
   RECORD(RsLoss) FIELD(RsLoss, width) FIELD(RsLoss, height) FIELD(RsLoss, stride) \
     FIELD(RsLoss, plane) FIELD(RsLoss, planes) FIELD(RsLoss, composite) FIELD(RsLoss, red) \
     FIELD(RsLoss, green) FIELD(RsLoss, blue) FIELD(RsLoss, pixel_scale) FIELD(RsLoss, ssim_scale) \
+    FIELD(RsLoss, alpha_scale) \
   RECORD(RsForward) FIELD(RsForward, window) FIELD(RsForward, background) \
     FIELD(RsForward, min_transmittance) FIELD(RsForward, max_hits) \
     FIELD(RsForward, pool_capacity) FIELD(RsForward, padding) \

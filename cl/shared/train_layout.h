@@ -47,9 +47,10 @@ typedef struct {
   // The mask m. 0: the photo's alpha; 1: the photo is blended over the background and m is 1; 2:
   // the same, and m is the photo's plane of weights.
   rs_int composite;
-  rs_float red, green, blue;         // of the background
-  rs_float pixel_scale, ssim_scale;  // of the terms in the gradient
+  rs_float red, green, blue;  // of the background
+  // Of the terms in the gradient; that of coverage is 0 where alpha is a mask.
+  rs_float pixel_scale, ssim_scale, alpha_scale;
 } RsLoss;
-RS_STATIC_ASSERT_SIZE(RsLoss, 44);
+RS_STATIC_ASSERT_SIZE(RsLoss, 48);
 
 #endif

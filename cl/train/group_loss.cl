@@ -168,8 +168,8 @@ __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_ssim_de
   }
 }
 
-// gradient = pixel_scale * m rho'(x - y) + ssim_scale * m dSSIM/dx' for R, G, B; the A plane is
-// zeroed.
+// gradient = pixel_scale * m rho'(x - y) + ssim_scale * m dSSIM/dx' for R, G, B, and
+// alpha_scale * m rho'(A - a) for the coverage A of the image and the photo's alpha a.
 __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_gradient(
     const __global float* image,
     const __global uint* photo,
@@ -216,5 +216,12 @@ __kernel __attribute__((reqd_work_group_size(SIDE, SIDE, 1))) void group_gradien
              v * RS_WINDOW(rows[2] + center, SIDE));
 #endif
   gradient[channel * pixels + pixel] = result;
-  if (channel == 0) gradient[3 * pixels + pixel] = 0.0f;
+  if (channel > 0) return;
+  float by_coverage = 0.0f;
+  if (loss.alpha_scale > 0.0f) {
+    const float alpha = rs_photo_channel(photo, loss.planes, pixels, pixel, 1, 3);
+    const float missing = s.mask * (image[3 * pixels + pixel] - alpha);
+    by_coverage = rs_pixel_gradient(missing, s.mask, loss.alpha_scale);
+  }
+  gradient[3 * pixels + pixel] = by_coverage;
 }

@@ -91,9 +91,28 @@ __kernel void ssim_derivatives(const __global float* pair,
   partials[(channel * tiles_y + tile_y) * tiles_x + tile_x] = rs_lane_sum(sum);
 }
 
-// gradient = pixel_scale * m rho'(x - y) + ssim_scale * m dSSIM/dx' for R, G, B; the A plane is
-// zeroed.
-__kernel void loss_gradient(const __global float* pair,
+// LANES neighbouring pixels of a plane, of which the row has `count`; those beyond are 0.
+fv load_pixels(const __global float* in, bool whole, int count) {
+  if (whole) return rs_load(in);
+  float tail[LANES];
+  for (int k = 0; k < LANES; ++k) tail[k] = k < count ? in[k] : 0.0f;
+  return rs_load_private(tail);
+}
+
+void store_pixels(fv values, bool whole, int count, __global float* out) {
+  if (whole) {
+    rs_store(values, out);
+    return;
+  }
+  float tail[LANES];
+  rs_store_private(values, tail);
+  for (int k = 0; k < LANES && k < count; ++k) out[k] = tail[k];
+}
+
+// gradient = pixel_scale * m rho'(x - y) + ssim_scale * m dSSIM/dx' for R, G, B, and
+// alpha_scale * m rho'(A - a) for the coverage A of the image and the photo's alpha a.
+__kernel void loss_gradient(const __global float* image,
+                            const __global float* pair,
                             const __global float* derivatives,
                             const __global uint* photo,
                             __global float* gradient,
@@ -143,18 +162,16 @@ __kernel void loss_gradient(const __global float* pair,
                  v * rs_window_row(g + HALO + i));
 #endif
       __global float* out = gradient + channel * pixels + pixel;
-      __global float* alpha = gradient + 3 * pixels + pixel;
-      if (whole) {
-        rs_store(result, out);
-        if (channel == 0) rs_store((fv)(0.0f), alpha);
-      } else {
-        float tail[LANES];
-        rs_store_private(result, tail);
-        for (int k = 0; column + k < last; ++k) {
-          out[k] = tail[k];
-          if (channel == 0) alpha[k] = 0.0f;
-        }
+      store_pixels(result, whole, last - column, out);
+      if (channel > 0) continue;
+      fv by_coverage = (fv)(0.0f);
+      if (loss.alpha_scale > 0.0f) {
+        const __global float* coverage = image + 3 * pixels + pixel;
+        const fv alpha = rs_photo_channel(photo, loss.planes, pixels, pixel, last - column, 3);
+        const fv missing = mask * (load_pixels(coverage, whole, last - column) - alpha);
+        by_coverage = rs_pixel_gradient(missing, mask, loss.alpha_scale);
       }
+      store_pixels(by_coverage, whole, last - column, gradient + 3 * pixels + pixel);
     }
   }
 }

@@ -56,7 +56,7 @@ void add_step(Context& context,
   for (std::uint32_t& pixel : photo) pixel = static_cast<std::uint32_t>(random.bits());
   Buffer<std::uint32_t> target(context, photo.size(), "photo");
   target.upload(photo);
-  ImageLoss loss(context, PixelLoss::kL1, 0.2f);
+  ImageLoss loss(context, PixelLoss::kL1, {0.2f});
   Buffer<float> image_gradient;
   loss.evaluate(tracer.image(), {target}, false, {0, 0, 0}, width, height, image_gradient);
   out.push_back({way + "gradient of the image", image_gradient.download()});

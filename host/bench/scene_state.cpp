@@ -85,7 +85,7 @@ void SceneBench::Impl::forward_with_hits() {
 
 void SceneBench::Impl::make_loss() {
   if (image_loss) return;
-  image_loss = std::make_unique<ImageLoss>(context, PixelLoss::kL1, 0.2f);
+  image_loss = std::make_unique<ImageLoss>(context, PixelLoss::kL1, ImageLoss::Weights{0.2f});
   const auto size = static_cast<std::size_t>(pixels());
   std::vector<float> image = random_floats(4 * size, 0.5, options.seed, kPictureStream);
   for (float& value : image) value += 0.5f;

@@ -21,8 +21,8 @@
 #include "io/frame_lists.hpp"
 #include "io/llff.hpp"
 #include "io/photo_folder.hpp"
-#include "io/photo_views.hpp"
 #include "io/photo_mask.hpp"
+#include "io/photo_views.hpp"
 #include "io/ply_points.hpp"
 #include "io/polycam.hpp"
 #include "io/transforms.hpp"
@@ -178,8 +178,7 @@ Dataset load_nerfstudio(const fs::path& path, const DatasetOptions& options) {
   dataset.kind = DatasetKind::kNerfstudio;
   const std::set<std::string> names = frame_names(file);
   dataset.views = views_of(file, options);
-  const bool divided =
-      divide_by_lists(file, names, options.test_list.has_value(), dataset.views);
+  const bool divided = divide_by_lists(file, names, options.test_list.has_value(), dataset.views);
   sort_by_name(dataset.views);
   if (!divided) mark_every(dataset, options);
   std::vector<double> points;

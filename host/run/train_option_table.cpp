@@ -259,6 +259,9 @@ void add_loss_options(TrainTable& t, TrainOptions& o) {
                       "pixel term: l1 (mean absolute error) or l2 (mean squared error)");
   t.number("ssim-weight", o.ssim_weight, 0, 1,
            "lambda in (1 - lambda) pixel term + lambda (1 - SSIM)");
+  t.number("alpha-weight", o.alpha_weight, 0, 1e3,
+           "weight of the mean error of coverage in the loss, where photos are cut out: what has "
+           "the background's colour is part of the model too, and holes stay open");
 
   t.flag("exposure", o.exposure,
          "find an affine colour (3 x 4) for each training photo too, for captures whose exposure "

@@ -33,6 +33,7 @@ struct ImageLoss::Impl {
 
   Context& context;
   float ssim_weight;
+  float alpha_weight;
   bool grouped;  // a work-group per tile and channel, a work-item per pixel
   bool serial;   // one work-item per group: work-items are long and nothing is gained by grouping
                  // them
@@ -48,17 +49,23 @@ struct ImageLoss::Impl {
   int plane = 0;
   bool laid_out = false;  // whether all buffers are for an image of this size
 
-  Impl(Context& owner, PixelLoss pixel_loss, float weight, int vector)
+  Impl(Context& owner, PixelLoss pixel_loss, Weights weights, int vector)
       : context(owner),
-        ssim_weight(weight),
+        ssim_weight(weights.ssim),
+        alpha_weight(weights.alpha),
         grouped(vector == kGroups || (vector == 0 && owner.device().type != DeviceType::kCpu &&
                                       takes_groups(owner.device()))),
         serial(!grouped && owner.device().type == DeviceType::kCpu),
         tile(serial ? 128 : kSide),
         rows(serial ? 8 : (grouped ? kSide : 1)) {
-    if (!(weight >= 0.0f && weight <= 1.0f)) {
+    if (!(ssim_weight >= 0.0f && ssim_weight <= 1.0f)) {
+      throw UsageError(fmt::format("The weight of SSIM in the loss is {}; give a value from 0 to 1",
+                                   ssim_weight));
+    }
+    if (!(alpha_weight >= 0.0f)) {
       throw UsageError(
-          fmt::format("The weight of SSIM in the loss is {}; give a value from 0 to 1", weight));
+          fmt::format("The weight of coverage in the loss is {}; give a value that is not negative",
+                      alpha_weight));
     }
     if (grouped && !takes_groups(owner.device())) {
       throw DeviceError(fmt::format(
@@ -75,7 +82,7 @@ struct ImageLoss::Impl {
           .define("ROWS", rows);
       prepare = owner.kernel("train/loss_prepare.cl", "prepare_pair", build);
     }
-    build.define("SSIM_GRADIENT", weight > 0.0f ? 1 : 0);
+    build.define("SSIM_GRADIENT", ssim_weight > 0.0f ? 1 : 0);
     const char* program = grouped ? "train/group_loss.cl" : "train/loss_ssim.cl";
     derivatives_kernel =
         owner.kernel(program, grouped ? "group_ssim_derivatives" : "ssim_derivatives", build);
@@ -131,6 +138,7 @@ struct ImageLoss::Impl {
     loss.blue = background[2];
     loss.pixel_scale = (1.0f - ssim_weight) * share;
     loss.ssim_scale = -ssim_weight * share;
+    loss.alpha_scale = alpha_is_background ? alpha_weight * 3.0f * share : 0.0f;
     return loss;
   }
 
@@ -143,7 +151,7 @@ struct ImageLoss::Impl {
     prepare.launch(range, image, photo.words, pair, pixel_partials, loss);
     range.global[2] = 3;
     derivatives_kernel.launch(range, pair, derivatives, ssim_partials, loss);
-    gradient_kernel.launch(range, pair, derivatives, photo.words, gradient, loss);
+    gradient_kernel.launch(range, image, pair, derivatives, photo.words, gradient, loss);
   }
 
   void evaluate_groups(const Buffer<float>& image,
@@ -159,8 +167,8 @@ struct ImageLoss::Impl {
   }
 };
 
-ImageLoss::ImageLoss(Context& context, PixelLoss pixel_loss, float ssim_weight, int vector)
-    : impl_(std::make_unique<Impl>(context, pixel_loss, ssim_weight, vector)) {}
+ImageLoss::ImageLoss(Context& context, PixelLoss pixel_loss, Weights weights, int vector)
+    : impl_(std::make_unique<Impl>(context, pixel_loss, weights, vector)) {}
 ImageLoss::~ImageLoss() = default;
 
 void ImageLoss::evaluate(const Buffer<float>& image,

@@ -21,7 +21,9 @@ namespace raysplats {
 /// still taken over *all* pixels, so masking takes a pixel's share out of the loss and leaves the
 /// weight of the others as it was; a masked pixel (m = 0) is equal in both images and contributes
 /// neither value nor gradient. With alpha_is_background y = rgb * a + background * (1 - a) and m =
-/// 1 everywhere, or what the photo's plane of weights says.
+/// 1 everywhere, or what the photo's plane of weights says; then the gradient has the term of
+/// coverage too: mu times the mean over pixels of m rho(A - a), without which a body in the colour
+/// of the background is as good as none. The value leaves it out.
 class ImageLoss {
  public:
   /// Where evaluate() leaves its sums: {pixel term, squared error, weight, 0} per tile or per tile
@@ -44,15 +46,21 @@ class ImageLoss {
                       ///< when equal
   };
 
-  /// `ssim_weight` is lambda, in [0, 1]. `vector` is the number of pixels per vector (1, 4, 8 or
-  /// 16) or kGroups; 0 = the device's own on CPUs, groups elsewhere. Throws UsageError for other
-  /// values, DeviceError for groups that the device has no room for.
-  ImageLoss(Context& context, PixelLoss pixel_loss, float ssim_weight, int vector = 0);
+  /// What its terms weigh: lambda, in [0, 1], and mu.
+  struct Weights {
+    float ssim = 0;
+    float alpha = 0;
+  };
+
+  /// `vector` is the number of pixels per vector (1, 4, 8 or 16) or kGroups; 0 = the device's own
+  /// on CPUs, groups elsewhere. Throws UsageError for other values, DeviceError for groups that the
+  /// device has no room for.
+  ImageLoss(Context& context, PixelLoss pixel_loss, Weights weights, int vector = 0);
   ~ImageLoss();
 
-  /// Enqueues loss and gradient. `image`: planar R, G, B, A (A is not read), 4 x height x width.
+  /// Enqueues loss and gradient. `image`: planar R, G, B, A (A is read for mu), 4 x height x width.
   /// `photo`: of the same size; its weights count with alpha_is_background. `gradient` is grown as
-  /// needed and overwritten: planar dL/dR, dL/dG, dL/dB and zeros for A. Nothing is waited for.
+  /// needed and overwritten: planar dL/dR, dL/dG, dL/dB, dL/dA. Nothing is waited for.
   void evaluate(const Buffer<float>& image,
                 const DevicePhoto& photo,
                 bool alpha_is_background,

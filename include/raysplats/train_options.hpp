@@ -124,6 +124,7 @@ struct TrainOptions {
   // Loss
   PixelLoss pixel_loss = PixelLoss::kL1;  ///< pixel term
   double ssim_weight = 0.2;               ///< lambda of (1 - lambda) pixel term + lambda (1 - SSIM)
+  double alpha_weight = 0.2;              ///< of the error of coverage, where photos are cut out
   bool exposure = false;                  ///< an affine colour per training photo is trained too
   double exposure_damping = 0.02;         ///< of its change at a visit of the photo
   double depth_weight = 0;                ///< of the relative error of depth in the loss; 0 = off

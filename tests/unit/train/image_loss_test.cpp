@@ -154,6 +154,18 @@ Reference reference_loss(const Scene& s,
   return out;
 }
 
+// The term of coverage, without its weight.
+double reference_coverage(const Scene& s, const std::vector<double>& image, PixelLoss pixel_loss) {
+  double sum = 0;
+  for (std::size_t i = 0; i < s.pixels(); ++i) {
+    const double d = image[3 * s.pixels() + i] - photo_channel(s, i, 3);
+    sum += photo_weight(s, i) * (pixel_loss == PixelLoss::kL2 ? d * d : std::abs(d));
+  }
+  return sum / static_cast<double>(s.pixels());
+}
+
+constexpr float kAlphaWeight = 0.3f;
+
 struct Result {
   ImageLoss::Value value;
   std::vector<float> gradient;
@@ -179,7 +191,7 @@ Result run(const Scene& s, ImageLoss& loss) {
 }
 
 Result run(const Scene& s, PixelLoss pixel_loss, float weight, int vector) {
-  ImageLoss loss(context(), pixel_loss, weight, vector);
+  ImageLoss loss(context(), pixel_loss, {weight, kAlphaWeight}, vector);
   return run(s, loss);
 }
 
@@ -216,7 +228,23 @@ void check_gradient(const Scene& s,
     CHECK(std::abs(static_cast<double>(gradient[i]) - expected) <
           2e-4 * std::abs(expected) + 2e-4 * scale);
   }
-  for (std::size_t i = 3 * s.pixels(); i < 4 * s.pixels(); ++i) CHECK(gradient[i] == 0.0f);
+  for (std::size_t i = 3 * s.pixels(); i < 4 * s.pixels(); ++i) {
+    if (!s.alpha_is_background) {
+      CHECK(gradient[i] == 0.0f);
+      continue;
+    }
+    const double h = 1e-6;
+    const double center = image[i];
+    image[i] = center + h;
+    const double above = reference_coverage(s, image, pixel_loss);
+    image[i] = center - h;
+    const double below = reference_coverage(s, image, pixel_loss);
+    image[i] = center;
+    const double expected = static_cast<double>(kAlphaWeight) * (above - below) / (2 * h);
+    CAPTURE(i);
+    CHECK(std::abs(static_cast<double>(gradient[i]) - expected) <
+          2e-4 * std::abs(expected) + 2e-4 * scale);
+  }
 }
 
 }  // namespace
@@ -335,6 +363,7 @@ TEST_CASE("image loss: what lies under a mask changes nothing") {
 
 TEST_CASE("image loss: every vector width and groups give the same result") {
   Scene s = make_scene(150, 37, 7, true);
+  s.alpha_is_background = true;
   const Result narrow = run(s, PixelLoss::kL1, 0.2f, 1);
   for (const int vector : {4, 8, 16, ImageLoss::kGroups}) {
     CAPTURE(vector);
@@ -353,7 +382,7 @@ TEST_CASE("image loss: every vector width and groups give the same result") {
 
 TEST_CASE("image loss: finite differences through value()") {
   Scene s = make_scene(20, 13, 13, true);
-  ImageLoss loss(context(), PixelLoss::kL2, 0.5f);
+  ImageLoss loss(context(), PixelLoss::kL2, {0.5f});
   const std::vector<float> gradient = run(s, loss).gradient;
   for (std::size_t i = 4; i < 3 * s.pixels(); i += 97) {
     const float center = s.image[i];
@@ -375,7 +404,7 @@ TEST_CASE("image loss: one object serves images of changing size, and repeats to
   const Scene small = make_scene(9, 30, 19, false);
   for (const int form : kForms) {
     CAPTURE(form);
-    ImageLoss loss(context(), PixelLoss::kL1, 0.2f, form);
+    ImageLoss loss(context(), PixelLoss::kL1, {0.2f, kAlphaWeight}, form);
     const Result first = run(large, loss);
     const Result second = run(small, loss);
     const Result third = run(large, loss);
@@ -394,7 +423,7 @@ TEST_CASE("image loss: after an allocation that failed the next image of that si
     bool failed = true;
     for (std::size_t n = 1; failed; ++n) {
       CAPTURE(n);
-      ImageLoss loss(context(), PixelLoss::kL1, 0.2f, form);
+      ImageLoss loss(context(), PixelLoss::kL1, {0.2f, kAlphaWeight}, form);
       run(former, loss);
       failed = fails_at(context(), n, [&] { run(next, loss); });
       const Result result = run(next, loss);
@@ -417,9 +446,9 @@ TEST_CASE("image loss: equal images have no loss, and bad arguments are refused"
   CHECK(std::isinf(result.value.psnr));
   for (const float g : result.gradient) CHECK(std::abs(g) < 1e-7f);
 
-  CHECK_THROWS_AS(ImageLoss(context(), PixelLoss::kL1, 1.5f), UsageError);
-  CHECK_THROWS_AS(ImageLoss(context(), PixelLoss::kL1, 0.2f, 3), UsageError);
-  ImageLoss loss(context(), PixelLoss::kL1, 0.2f);
+  CHECK_THROWS_AS(ImageLoss(context(), PixelLoss::kL1, {1.5f}), UsageError);
+  CHECK_THROWS_AS(ImageLoss(context(), PixelLoss::kL1, {0.2f}, 3), UsageError);
+  ImageLoss loss(context(), PixelLoss::kL1, {0.2f});
   CHECK_THROWS_AS(loss.value(), UsageError);
   Buffer<float> image(context(), 16, "image"), gradient;
   Buffer<std::uint32_t> target(context(), 4, "target");

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec4.hpp>
+#include <memory>
 #include <vector>
 
 #include "scene/camera_model.hpp"
@@ -63,6 +64,24 @@ TEST_CASE("carving fills the body that the photos show, in its colour") {
   }
   CHECK(volume > 300);
   CHECK(carved_points(photos, {{9, 9, 9}, 0.1}, 10, 7).size() == 0);
+}
+
+TEST_CASE("a body that is half transparent all over counts as a body") {
+  std::vector<SmallPhoto> photos = ring_of_ball();
+  const double opaque = opaque_share(photos), range = color_range(photos);
+  for (SmallPhoto& photo : photos) {
+    auto veiled = std::make_shared<io::Photo>(*photo.picture);
+    for (std::uint32_t& word : veiled->words) word = (word & 0xffffffu) | (word >> 25) << 24;
+    photo.picture = veiled;
+  }
+  CHECK(opaque_share(photos) == doctest::Approx(opaque).epsilon(0.25));  // without its outline
+  CHECK(color_range(photos) == doctest::Approx(range).epsilon(0.02));
+  const PointCloud points = carved_points(photos, {{0, 0, 0}, 1.2}, 100, 7);
+  REQUIRE(points.size() == 100);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    CHECK(points.colors[3 * i] == doctest::Approx(0.9).epsilon(0.02));
+    CHECK(points.colors[3 * i + 2] == doctest::Approx(0.1).epsilon(0.05));
+  }
 }
 
 TEST_CASE("points that cut-out photos show as background are left out") {

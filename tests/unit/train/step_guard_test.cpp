@@ -23,7 +23,7 @@ constexpr std::size_t kPixels = kSide * kSide;
 // A guard with the loss that it watches.
 struct Fixture {
   Context context{test_device()};
-  ImageLoss loss{context, PixelLoss::kL1, 0.2f};
+  ImageLoss loss{context, PixelLoss::kL1, {0.2f}};
   StepGuard guard{context};
   Buffer<float> image{context, 4 * kPixels, "image"};
   Buffer<std::uint32_t> photo{context, kPixels, "photo"};
