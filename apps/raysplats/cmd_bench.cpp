@@ -15,7 +15,7 @@
 #include "bench/forecast.hpp"
 #include "bench/kernel_folders.hpp"
 #include "commands.hpp"
-#include "io/dataset_views.hpp"
+#include "io/dataset/dataset_views.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"

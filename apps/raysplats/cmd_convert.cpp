@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "commands.hpp"
-#include "io/convert_model.hpp"
-#include "io/dataset_views.hpp"
-#include "io/model_file.hpp"
+#include "io/dataset/dataset_views.hpp"
+#include "io/model/convert_model.hpp"
+#include "io/model/model_file.hpp"
 #include "options.hpp"
 #include "raysplats/contributions.hpp"
 #include "raysplats/error.hpp"

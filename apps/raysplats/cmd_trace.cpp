@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "commands.hpp"
-#include "io/ray_file.hpp"
+#include "io/scene/ray_file.hpp"
 #include "model_argument.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"

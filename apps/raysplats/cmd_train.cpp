@@ -11,7 +11,7 @@
 #include <system_error>
 
 #include "commands.hpp"
-#include "io/sized_dataset.hpp"
+#include "io/dataset/sized_dataset.hpp"
 #include "options.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trainer.hpp"

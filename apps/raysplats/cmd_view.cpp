@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "commands.hpp"
-#include "io/camera_list.hpp"
-#include "io/scene_file.hpp"
-#include "io/scene_loader.hpp"
+#include "io/dataset/camera_list.hpp"
+#include "io/scene/scene_file.hpp"
+#include "io/scene/scene_loader.hpp"
 #include "model_argument.hpp"
 #include "options.hpp"
 #include "raysplats/io.hpp"

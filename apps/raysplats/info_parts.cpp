@@ -11,10 +11,10 @@
 
 #include "bench/report.hpp"
 #include "info_file.hpp"
-#include "io/colmap_model.hpp"
-#include "io/mtl_materials.hpp"
+#include "io/dataset/colmap_model.hpp"
+#include "io/dataset/ply_points.hpp"
+#include "io/mesh/mtl_materials.hpp"
 #include "io/ply_file.hpp"
-#include "io/ply_points.hpp"
 #include "raysplats/lpips.hpp"
 #include "report/run_files.hpp"
 #include "util/file_kind.hpp"

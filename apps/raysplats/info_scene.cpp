@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "info_file.hpp"
-#include "io/mesh_file.hpp"
-#include "io/model_formats.hpp"
+#include "io/mesh/mesh_file.hpp"
+#include "io/model/model_formats.hpp"
 #include "io/ply_file.hpp"
-#include "io/scene_file.hpp"
+#include "io/scene/scene_file.hpp"
 #include "util/number_text.hpp"
 #include "util/path_text.hpp"
 

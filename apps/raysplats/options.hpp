@@ -11,7 +11,7 @@
 
 #include "comm/communicator.hpp"
 #include "device/context.hpp"
-#include "io/data_option_table.hpp"
+#include "io/dataset/data_option_table.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trace_options.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "io/side_limits.hpp"
+#include "io/image/side_limits.hpp"
 #include "raysplats/error.hpp"
 #include "render/output_check.hpp"
 #include "util/atomic_file.hpp"

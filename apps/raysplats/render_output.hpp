@@ -7,7 +7,7 @@
 #include <string>
 
 #include "comm/communicator.hpp"
-#include "io/camera_path_file.hpp"
+#include "io/scene/camera_path_file.hpp"
 #include "render_flags.hpp"
 
 namespace raysplats::cli {

@@ -5,7 +5,7 @@
 #include <charconv>
 
 #include "frame_progress.hpp"
-#include "io/scene_loader.hpp"
+#include "io/scene/scene_loader.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/path_tracer.hpp"
 #include "render/output_check.hpp"

@@ -20,8 +20,8 @@
 #include "scene/trace_option_table.hpp"
 #include "trace/packet_layout.hpp"
 #include "trace/ray_tracer.hpp"
-#include "train/adam.hpp"
-#include "train/image_loss.hpp"
+#include "train/loss/image_loss.hpp"
+#include "train/optimizer/adam.hpp"
 #include "util/rng.hpp"
 
 namespace raysplats {

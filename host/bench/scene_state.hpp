@@ -16,9 +16,9 @@
 #include "raysplats/scene.hpp"
 #include "trace/camera_tracer.hpp"
 #include "trace/ray_tracer.hpp"
-#include "train/adam.hpp"
-#include "train/density_control.hpp"
-#include "train/image_loss.hpp"
+#include "train/density/density_control.hpp"
+#include "train/loss/image_loss.hpp"
+#include "train/optimizer/adam.hpp"
 
 namespace raysplats {
 

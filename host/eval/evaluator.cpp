@@ -14,7 +14,7 @@
 #include "eval/error_map.hpp"
 #include "eval/metrics.hpp"
 #include "eval/view_alignment.hpp"
-#include "io/dataset_views.hpp"
+#include "io/dataset/dataset_views.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "render/frame_writer.hpp"

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "io/image_codec.hpp"
+#include "io/image/image_codec.hpp"
 #include "raysplats/error.hpp"
 #include "scene/image_check.hpp"
 #include "util/file_kind.hpp"

@@ -23,7 +23,7 @@
 #include <initializer_list>
 #include <utility>
 
-#include "io/image_limits.hpp"
+#include "io/image/image_limits.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::io {

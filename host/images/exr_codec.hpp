@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "io/image_codec.hpp"
+#include "io/image/image_codec.hpp"
 
 namespace raysplats::io {
 

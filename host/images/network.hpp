@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "io/image_codec.hpp"
+#include "io/image/image_codec.hpp"
 
 namespace raysplats::io {
 

@@ -16,9 +16,9 @@
 
 #include "images/exr_codec.hpp"
 #include "images/network.hpp"
-#include "io/image_codec.hpp"
-#include "io/image_limits.hpp"
-#include "io/images_interface.hpp"
+#include "io/image/image_codec.hpp"
+#include "io/image/image_limits.hpp"
+#include "io/image/images_interface.hpp"
 #include "raysplats/error.hpp"
 
 namespace raysplats::io {

@@ -10,7 +10,7 @@
 #include <tuple>
 #include <utility>
 
-#include "io/image_file.hpp"
+#include "io/image/image_file.hpp"
 
 namespace raysplats {
 namespace {

@@ -11,7 +11,7 @@
 #include <map>
 #include <set>
 
-#include "io/colmap_model.hpp"
+#include "io/dataset/colmap_model.hpp"
 #include "prepare/colmap_plan.hpp"
 #include "prepare/colmap_steps.hpp"
 #include "prepare/frames.hpp"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "io/video_file.hpp"
+#include "io/image/video_file.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/image.hpp"
 #include "raysplats/model.hpp"

@@ -9,7 +9,7 @@
 #include <set>
 #include <system_error>
 
-#include "io/dataset_advice.hpp"
+#include "io/dataset/dataset_advice.hpp"
 #include "raysplats/error.hpp"
 #include "util/file_kind.hpp"
 

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <functional>
 
-#include "io/scene_loader.hpp"
+#include "io/scene/scene_loader.hpp"
 #include "raysplats/path_tracer.hpp"
 #include "render/frame_writer.hpp"
 

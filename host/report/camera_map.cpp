@@ -14,7 +14,7 @@
 #include <system_error>
 #include <vector>
 
-#include "io/camera_list.hpp"
+#include "io/dataset/camera_list.hpp"
 #include "report/html.hpp"
 #include "report/run_files.hpp"
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "io/image_codec.hpp"
+#include "io/image/image_codec.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/image.hpp"
 #include "raysplats/io.hpp"

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/image_file.hpp"
+#include "io/image/image_file.hpp"
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"

@@ -5,7 +5,7 @@
 
 #include <utility>
 
-#include "io/mesh_file.hpp"
+#include "io/mesh/mesh_file.hpp"
 
 namespace raysplats {
 

@@ -14,7 +14,7 @@
 #include <tuple>
 #include <vector>
 
-#include "io/model_file.hpp"
+#include "io/model/model_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "run/train_config.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "io/scene_file.hpp"
+#include "io/scene/scene_file.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/trace_options.hpp"
 #include "raysplats/train_options.hpp"

@@ -5,7 +5,7 @@
 #include <optional>
 #include <system_error>
 
-#include "io/camera_list.hpp"
+#include "io/dataset/camera_list.hpp"
 
 namespace raysplats {
 namespace {

@@ -14,10 +14,10 @@
 #include <utility>
 #include <vector>
 
-#include "io/data_origin.hpp"
+#include "io/dataset/data_origin.hpp"
+#include "io/dataset/transforms_camera.hpp"
 #include "io/file_hash.hpp"
-#include "io/model_formats.hpp"
-#include "io/transforms_camera.hpp"
+#include "io/model/model_formats.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "run/train_config.hpp"

@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-#include "io/data_option_table.hpp"
+#include "io/dataset/data_option_table.hpp"
 #include "raysplats/error.hpp"
 #include "scene/trace_option_table.hpp"
 #include "util/number_text.hpp"

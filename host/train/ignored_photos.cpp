@@ -11,8 +11,8 @@
 #include <set>
 #include <vector>
 
-#include "io/image_file.hpp"
-#include "io/photo_rows.hpp"
+#include "io/image/image_file.hpp"
+#include "io/photo/photo_rows.hpp"
 #include "raysplats/error.hpp"
 #include "util/parallel.hpp"
 

@@ -29,7 +29,8 @@
 namespace raysplats {
 namespace {
 
-// Bytes of a pixel in the nine planes of SSIM's derivatives in one buffer (train/image_loss.cpp).
+// Bytes of a pixel in the nine planes of SSIM's derivatives in one buffer
+// (train/loss/image_loss.cpp).
 constexpr std::size_t kSsimPlaneBytes = 9 * sizeof(float);
 
 // Whether gradients of packets may be added in long integers. Copies that do not fit their share

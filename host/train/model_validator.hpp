@@ -10,7 +10,7 @@
 #include "trace/device_gaussians.hpp"
 #include "trace/ray_tracer.hpp"
 #include "trace/ray_tree.hpp"
-#include "train/adam.hpp"
+#include "train/optimizer/adam.hpp"
 
 namespace raysplats {
 

@@ -5,9 +5,9 @@
 #include "raysplats/train_options.hpp"
 #include "run/checkpoint.hpp"
 #include "trace/device_gaussians.hpp"
-#include "train/adam.hpp"
-#include "train/density_control.hpp"
-#include "train/parameter_mean.hpp"
+#include "train/density/density_control.hpp"
+#include "train/optimizer/adam.hpp"
+#include "train/optimizer/parameter_mean.hpp"
 
 namespace raysplats {
 

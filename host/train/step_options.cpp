@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "train/step_options.hpp"
 
+#include "train/optimizer/sky_adam.hpp"
 #include "train/schedule.hpp"
-#include "train/sky_adam.hpp"
 
 namespace raysplats {
 

@@ -6,7 +6,7 @@
 
 #include "raysplats/trace_options.hpp"
 #include "raysplats/train_options.hpp"
-#include "train/adam.hpp"
+#include "train/optimizer/adam.hpp"
 
 namespace raysplats {
 

@@ -7,9 +7,9 @@
 #include <span>
 #include <utility>
 
-#include "io/data_option_table.hpp"
-#include "io/dataset_views.hpp"
-#include "io/photo.hpp"
+#include "io/dataset/data_option_table.hpp"
+#include "io/dataset/dataset_views.hpp"
+#include "io/photo/photo.hpp"
 #include "raysplats/error.hpp"
 #include "run/dataset_fingerprint.hpp"
 #include "run/mirror_meshes.hpp"

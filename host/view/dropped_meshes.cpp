@@ -13,7 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "io/scene_file.hpp"
+#include "io/scene/scene_file.hpp"
 #include "raysplats/error.hpp"
 #include "scene/mesh.hpp"
 #include "util/json_text.hpp"

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "io/image_codec.hpp"
+#include "io/image/image_codec.hpp"
 
 namespace raysplats::view {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "io/image_codec.hpp"
+#include "io/image/image_codec.hpp"
 
 namespace raysplats::view {
 namespace {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <variant>
 
-#include "io/mesh_file.hpp"
+#include "io/mesh/mesh_file.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/trace_options.hpp"
 

@@ -2,17 +2,17 @@
 # raysplats_images: formats of pictures and networks (host/images). As a rule a library that raysplats_io loads when
 # the first picture is opened, found along the run path of the program; with RAYSPLATS_IMAGES_STATIC linked as any other.
 # With RAYSPLATS_IMAGES_GIVEN there is none: the program that links the library defines raysplats_images_codec()
-# (io/image_codec.hpp).
+# (io/image/image_codec.hpp).
 
-# The headers that declare the interface, for io/images_interface.hpp.
+# The headers that declare the interface, for io/image/images_interface.hpp.
 set(headers "")
-foreach(header host/io/image_codec.hpp include/raysplats/image.hpp include/raysplats/error.hpp)
+foreach(header host/io/image/image_codec.hpp include/raysplats/image.hpp include/raysplats/error.hpp)
   file(SHA256 ${PROJECT_SOURCE_DIR}/${header} digest)
   string(APPEND headers ${digest})
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${header})
 endforeach()
 set_source_files_properties(
-  ${PROJECT_SOURCE_DIR}/host/io/image_codec.cpp ${PROJECT_SOURCE_DIR}/host/images/oiio_codec.cpp
+  ${PROJECT_SOURCE_DIR}/host/io/image/image_codec.cpp ${PROJECT_SOURCE_DIR}/host/images/oiio_codec.cpp
   PROPERTIES COMPILE_DEFINITIONS RAYSPLATS_IMAGES_HEADERS="${headers}")
 
 if(RAYSPLATS_IMAGES_GIVEN)

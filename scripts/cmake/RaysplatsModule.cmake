@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# raysplats_module(NAME DEPENDS ...) makes the static library raysplats_NAME from host/NAME/*.cpp.
+# raysplats_module(NAME DEPENDS ...) makes the static library raysplats_NAME from all *.cpp below host/NAME.
 
 set(RAYSPLATS_WARNINGS -Wall -Wextra -Wpedantic)
 if(RAYSPLATS_WERROR)
@@ -23,7 +23,7 @@ function(raysplats_module name)
   if(RAYSPLATS_BUNDLE)
     raysplats_bundle(ARG_DEPENDS)
   endif()
-  file(GLOB sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/host/${name}/*.cpp)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/host/${name}/*.cpp)
   set(target raysplats_${name})
   add_library(${target} STATIC ${sources})
   set_target_properties(${target} PROPERTIES LINKER_LANGUAGE CXX EXPORT_NAME ${name}

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "../skip_test.hpp"
-#include "io/colmap_model.hpp"
+#include "io/dataset/colmap_model.hpp"
 #include "prepare_stage.hpp"
 #include "program.hpp"
 #include "raysplats/io.hpp"

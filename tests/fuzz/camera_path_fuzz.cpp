@@ -4,7 +4,7 @@
 #include <array>
 
 #include "fuzz/fuzz_target.hpp"
-#include "io/camera_path_file.hpp"
+#include "io/scene/camera_path_file.hpp"
 #include "raysplats/io.hpp"
 
 namespace raysplats::fuzz {

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "fuzz/fuzz_target.hpp"
-#include "io/colmap_model.hpp"
+#include "io/dataset/colmap_model.hpp"
 
 namespace raysplats::fuzz {
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "fuzz/fuzz_target.hpp"
-#include "io/image_file.hpp"
+#include "io/image/image_file.hpp"
 #include "raysplats/io.hpp"
 
 namespace raysplats::fuzz {

@@ -6,7 +6,7 @@
 #include <span>
 
 #include "fuzz/fuzz_target.hpp"
-#include "io/mesh_file.hpp"
+#include "io/mesh/mesh_file.hpp"
 #include "scene/mesh.hpp"
 
 namespace raysplats::fuzz {

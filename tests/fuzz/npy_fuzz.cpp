@@ -4,7 +4,7 @@
 
 #include "fuzz/fuzz_target.hpp"
 #include "io/npy_file.hpp"
-#include "io/ray_file.hpp"
+#include "io/scene/ray_file.hpp"
 
 namespace raysplats::fuzz {
 namespace {

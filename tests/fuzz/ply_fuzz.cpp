@@ -3,7 +3,7 @@
 #include <cstdlib>
 
 #include "fuzz/fuzz_target.hpp"
-#include "io/ply_points.hpp"
+#include "io/dataset/ply_points.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 

@@ -3,8 +3,8 @@
 #include <string_view>
 
 #include "fuzz/fuzz_target.hpp"
-#include "io/scene_file.hpp"
-#include "io/scene_loader.hpp"
+#include "io/scene/scene_file.hpp"
+#include "io/scene/scene_loader.hpp"
 #include "raysplats/gaussians.hpp"
 #include "raysplats/image.hpp"
 #include "raysplats/io.hpp"

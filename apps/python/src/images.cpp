@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures reach the library by functions of Python (io/image_codec.hpp): by default Pillow's.
+// Pictures reach the library by functions of Python (io/image/image_codec.hpp): by default
+// Pillow's.
 #include "images.hpp"
 
 #include <fmt/format.h>
@@ -19,9 +20,9 @@
 #include <utility>
 
 #include "bindings.hpp"
-#include "io/image_codec.hpp"
-#include "io/image_header.hpp"
-#include "io/image_limits.hpp"
+#include "io/image/image_codec.hpp"
+#include "io/image/image_header.hpp"
+#include "io/image/image_limits.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "signals.hpp"

@@ -16,9 +16,9 @@
 
 #include "bindings.hpp"
 #include "images.hpp"
-#include "io/mesh_file.hpp"
-#include "io/scene_file.hpp"
-#include "io/scene_loader.hpp"
+#include "io/mesh/mesh_file.hpp"
+#include "io/scene/scene_file.hpp"
+#include "io/scene/scene_loader.hpp"
 #include "keywords.hpp"
 #include "names.hpp"
 #include "raysplats/error.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/body_outline.hpp"
+#include "io/photo/body_outline.hpp"
 
 #include <doctest/doctest.h>
 

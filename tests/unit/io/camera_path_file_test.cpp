@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/camera_path_file.hpp"
+#include "io/scene/camera_path_file.hpp"
 
 #include <doctest/doctest.h>
 #include <unistd.h>

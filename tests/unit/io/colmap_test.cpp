@@ -5,7 +5,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "io/colmap_model.hpp"
+#include "io/dataset/colmap_model.hpp"
 #include "raysplats/dataset.hpp"
 #include "unit/io/data_sets.hpp"
 #include "unit/log_capture.hpp"

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/convert_model.hpp"
+#include "io/model/convert_model.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 #include <tuple>
 
-#include "io/gaussian_codes.hpp"
-#include "io/model_file.hpp"
+#include "io/model/gaussian_codes.hpp"
+#include "io/model/model_file.hpp"
 #include "scene/gaussian_transform.hpp"
 #include "scene/morton_order.hpp"
 #include "unit/io/model_bytes.hpp"

@@ -2,7 +2,7 @@
 // COLMAP models of which a part that nobody needs is damaged or unknown.
 #include <doctest/doctest.h>
 
-#include "io/colmap_model.hpp"
+#include "io/dataset/colmap_model.hpp"
 #include "raysplats/dataset.hpp"
 #include "unit/io/data_sets.hpp"
 #include "unit/log_capture.hpp"

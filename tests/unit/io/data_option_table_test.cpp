@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/data_option_table.hpp"
+#include "io/dataset/data_option_table.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/data_origin.hpp"
+#include "io/dataset/data_origin.hpp"
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/dataset_advice.hpp"
+#include "io/dataset/dataset_advice.hpp"
 
 #include <doctest/doctest.h>
 

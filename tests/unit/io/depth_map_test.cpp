@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Depth maps in the forms that programs write them.
-#include "io/depth_map.hpp"
+#include "io/photo/depth_map.hpp"
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>

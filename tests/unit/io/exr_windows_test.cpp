@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "io/image_file.hpp"
+#include "io/image/image_file.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
 #include "unit/io/data_sets.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Photos and folders whose names are spelt otherwise.
-#include "io/find_image.hpp"
+#include "io/dataset/find_image.hpp"
 
 #include <doctest/doctest.h>
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "io/data_uri.hpp"
-#include "io/mesh_file.hpp"
+#include "io/mesh/mesh_file.hpp"
 #include "unit/io/gltf_fixture.hpp"
 #include "unit/log_capture.hpp"
 

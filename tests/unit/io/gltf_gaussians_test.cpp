@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
-#include "io/mesh_file.hpp"
-#include "io/model_formats.hpp"
+#include "io/mesh/mesh_file.hpp"
+#include "io/model/model_formats.hpp"
 #include "scene/gaussian_transform.hpp"
 #include "unit/io/gltf_fixture.hpp"
 #include "unit/io/model_bytes.hpp"

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <string>
 
-#include "io/mesh_file.hpp"
+#include "io/mesh/mesh_file.hpp"
 #include "raysplats/io.hpp"
 #include "unit/io/gltf_fixture.hpp"
 #include "unit/log_capture.hpp"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "io/image_file.hpp"
+#include "io/image/image_file.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
 #include "unit/io/photo_view.hpp"

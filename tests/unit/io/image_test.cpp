@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "io/image_file.hpp"
-#include "io/image_header.hpp"
+#include "io/image/image_file.hpp"
+#include "io/image/image_header.hpp"
 #include "raysplats/io.hpp"
 #include "unit/io/scratch.hpp"
 #include "util/rng.hpp"

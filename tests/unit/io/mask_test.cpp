@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/photo_rows.hpp"
+#include "io/photo/photo_rows.hpp"
 
 using namespace raysplats;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/mesh_file.hpp"
+#include "io/mesh/mesh_file.hpp"
 
 #include <doctest/doctest.h>
 

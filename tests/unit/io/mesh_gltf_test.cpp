@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "io/mesh_file.hpp"
+#include "io/mesh/mesh_file.hpp"
 #include "raysplats/io.hpp"
 #include "unit/io/gltf_fixture.hpp"
 #include "unit/log_capture.hpp"

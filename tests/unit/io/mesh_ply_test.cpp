@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "io/mesh_file.hpp"
+#include "io/mesh/mesh_file.hpp"
 #include "unit/io/scratch.hpp"
 #include "unit/log_capture.hpp"
 

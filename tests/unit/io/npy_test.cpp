@@ -15,7 +15,7 @@
 #include <string>
 
 #include "io/byte_reader.hpp"
-#include "io/ray_file.hpp"
+#include "io/scene/ray_file.hpp"
 #include "raysplats/error.hpp"
 #include "unit/temporary_directory.hpp"
 

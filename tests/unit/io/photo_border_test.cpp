@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/photo_border.hpp"
+#include "io/photo/photo_border.hpp"
 
 #include <doctest/doctest.h>
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "io/image_file.hpp"
-#include "io/photo.hpp"
+#include "io/image/image_file.hpp"
+#include "io/photo/photo.hpp"
 #include "raysplats/io.hpp"
 #include "unit/io/data_sets.hpp"
 #include "unit/io/photo_view.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the photos of a COLMAP model are found.
-#include "io/photo_folder.hpp"
+#include "io/dataset/photo_folder.hpp"
 
 #include <doctest/doctest.h>
 

@@ -13,10 +13,10 @@
 #include <numbers>
 #include <vector>
 
-#include "io/colmap_model.hpp"
-#include "io/depth_map.hpp"
-#include "io/transforms.hpp"
-#include "io/transforms_camera.hpp"
+#include "io/dataset/colmap_model.hpp"
+#include "io/dataset/transforms.hpp"
+#include "io/dataset/transforms_camera.hpp"
+#include "io/photo/depth_map.hpp"
 #include "raysplats/dataset.hpp"
 #include "scene/camera_model.hpp"
 #include "unit/io/data_sets.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/photo_orientation.hpp"
+#include "io/photo/photo_orientation.hpp"
 
 #include <OpenImageIO/imageio.h>
 #include <doctest/doctest.h>

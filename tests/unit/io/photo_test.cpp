@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/photo.hpp"
+#include "io/photo/photo.hpp"
 
 #include <OpenImageIO/imageio.h>
 #include <doctest/doctest.h>
@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "io/image_file.hpp"
+#include "io/image/image_file.hpp"
 #include "raysplats/io.hpp"
 #include "scene/sharpness.hpp"
 #include "unit/io/scratch.hpp"

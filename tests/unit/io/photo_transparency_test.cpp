@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/photo_transparency.hpp"
+#include "io/photo/photo_transparency.hpp"
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -8,7 +8,7 @@
 #include <functional>
 #include <string>
 
-#include "io/photo.hpp"
+#include "io/photo/photo.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "io/image_file.hpp"
+#include "io/image/image_file.hpp"
 #include "raysplats/dataset.hpp"
 
 namespace raysplats::test {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "io/gaussian_codes.hpp"
-#include "io/ply_points.hpp"
+#include "io/dataset/ply_points.hpp"
+#include "io/model/gaussian_codes.hpp"
 #include "raysplats/io.hpp"
 #include "unit/io/scratch.hpp"
 #include "unit/log_capture.hpp"

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <glm/matrix.hpp>
 
-#include "io/view_loader.hpp"
+#include "io/photo/view_loader.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
 #include "scene/pixel_count.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/repeated_photos.hpp"
+#include "io/photo/repeated_photos.hpp"
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>

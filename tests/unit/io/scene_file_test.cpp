@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/scene_file.hpp"
+#include "io/scene/scene_file.hpp"
 
 #include <doctest/doctest.h>
 

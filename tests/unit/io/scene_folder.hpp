@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <string>
 
-#include "io/scene_file.hpp"
+#include "io/scene/scene_file.hpp"
 #include "unit/io/scratch.hpp"
 
 namespace raysplats::test {

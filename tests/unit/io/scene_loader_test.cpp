@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/scene_loader.hpp"
+#include "io/scene/scene_loader.hpp"
 
 #include <doctest/doctest.h>
 

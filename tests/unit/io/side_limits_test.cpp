@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/side_limits.hpp"
+#include "io/image/side_limits.hpp"
 
 #include <doctest/doctest.h>
 
 #include <string>
 
-#include "io/video_file.hpp"
+#include "io/image/video_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "unit/io/scratch.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Data sets whose size is chosen once their views are known.
-#include "io/sized_dataset.hpp"
+#include "io/dataset/sized_dataset.hpp"
 
 #include <doctest/doctest.h>
 

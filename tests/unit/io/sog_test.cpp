@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "deflated_zip.hpp"
-#include "io/webp_texture.hpp"
+#include "io/image/webp_texture.hpp"
 #include "io/zip_archive.hpp"
 #include "scene/morton_order.hpp"
 #include "unit/io/model_bytes.hpp"

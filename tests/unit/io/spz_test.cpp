@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "io/compression.hpp"
-#include "io/spz_codes.hpp"
+#include "io/model/spz_codes.hpp"
 #include "scene/gaussian_transform.hpp"
 #include "unit/io/model_bytes.hpp"
 #include "unit/log_capture.hpp"

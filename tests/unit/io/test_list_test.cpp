@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lists of held-out photos: those that users give, and those that come with COLMAP models.
-#include "io/test_list.hpp"
+#include "io/dataset/test_list.hpp"
 
 #include <doctest/doctest.h>
 #include <fmt/format.h>
@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "io/data_option_table.hpp"
+#include "io/dataset/data_option_table.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "unit/io/data_sets.hpp"

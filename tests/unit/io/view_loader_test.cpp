@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "io/view_loader.hpp"
+#include "io/photo/view_loader.hpp"
 
 #include <doctest/doctest.h>
 

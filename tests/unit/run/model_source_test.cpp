@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "io/scene_loader.hpp"
+#include "io/scene/scene_loader.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "run/run_folder.hpp"

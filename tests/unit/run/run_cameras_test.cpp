@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "io/camera_list.hpp"
+#include "io/dataset/camera_list.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "run/run_folder.hpp"

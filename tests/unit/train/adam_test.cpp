@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/adam.hpp"
+#include "train/optimizer/adam.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/density_control.hpp"
+#include "train/density/density_control.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/depth_cache.hpp"
+#include "train/loss/depth_cache.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/depth_supervision.hpp"
+#include "train/loss/depth_supervision.hpp"
 
 #include <doctest/doctest.h>
 

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "io/depth_map.hpp"
+#include "io/photo/depth_map.hpp"
 #include "light/view_tracer.hpp"
 #include "raysplats/context.hpp"
 #include "raysplats/dataset.hpp"

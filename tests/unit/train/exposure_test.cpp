@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/exposure.hpp"
+#include "train/loss/exposure.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Flat Gaussians: how they begin, what a step takes off them, and what they cost.
-#include "train/flat_start.hpp"
+#include "train/start/flat_start.hpp"
 
 #include <doctest/doctest.h>
 
@@ -21,7 +21,7 @@
 #include "raysplats/trainer.hpp"
 #include "reference/gaussian.hpp"
 #include "reference/scenes.hpp"
-#include "train/footprint.hpp"
+#include "train/optimizer/footprint.hpp"
 #include "train/schedule.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"

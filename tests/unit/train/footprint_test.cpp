@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/footprint.hpp"
+#include "train/optimizer/footprint.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/grey_photos.hpp"
+#include "train/start/grey_photos.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/image_loss.hpp"
+#include "train/loss/image_loss.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/initialization.hpp"
+#include "train/start/initialization.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/mask_check.hpp"
+#include "train/start/mask_check.hpp"
 
 #include <doctest/doctest.h>
 

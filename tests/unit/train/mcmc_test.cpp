@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/mcmc.hpp"
+#include "train/density/mcmc.hpp"
 
 #include <doctest/doctest.h>
 
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "raysplats/device.hpp"
-#include "train/density_control.hpp"
+#include "train/density/density_control.hpp"
 #include "unit/fixture.hpp"
 #include "util/rng.hpp"
 

@@ -12,9 +12,9 @@
 #include "raysplats/error.hpp"
 #include "scene/pixel_count.hpp"
 #include "trace/camera_tracer.hpp"
-#include "train/adam.hpp"
-#include "train/density_control.hpp"
-#include "train/footprint.hpp"
+#include "train/density/density_control.hpp"
+#include "train/optimizer/adam.hpp"
+#include "train/optimizer/footprint.hpp"
 #include "unit/trace/trace_fixture.hpp"
 #include "util/mebibytes.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/parameter_mean.hpp"
+#include "train/optimizer/parameter_mean.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/photo_cache.hpp"
+#include "train/loss/photo_cache.hpp"
 
 #include <doctest/doctest.h>
 

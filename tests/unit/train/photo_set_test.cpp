@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/photo_set.hpp"
+#include "train/start/photo_set.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/photo_start.hpp"
+#include "train/start/photo_start.hpp"
 
 #include <doctest/doctest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/vec4.hpp>
 #include <memory>
 #include <vector>
 
 #include "scene/camera_model.hpp"
-#include "train/initialization.hpp"
-#include "train/plane_sweep.hpp"
+#include "train/start/initialization.hpp"
+#include "train/start/plane_sweep.hpp"
 #include "unit/train/test_photos.hpp"
 
 using namespace raysplats;

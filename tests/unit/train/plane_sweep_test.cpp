@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/plane_sweep.hpp"
+#include "train/start/plane_sweep.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/point_check.hpp"
+#include "train/start/point_check.hpp"
 
 #include <doctest/doctest.h>
 
@@ -8,10 +8,10 @@
 
 #include "scene/camera_model.hpp"
 #include "scene/statistics.hpp"
-#include "train/initialization.hpp"
-#include "train/photo_start.hpp"
-#include "train/plane_sweep.hpp"
-#include "train/point_cloud.hpp"
+#include "train/start/initialization.hpp"
+#include "train/start/photo_start.hpp"
+#include "train/start/plane_sweep.hpp"
+#include "train/start/point_cloud.hpp"
 #include "unit/train/test_photos.hpp"
 #include "util/rng.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/pose_check.hpp"
+#include "train/start/pose_check.hpp"
 
 #include <doctest/doctest.h>
 
@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "train/plane_sweep.hpp"
+#include "train/start/plane_sweep.hpp"
 #include "unit/log_capture.hpp"
 #include "unit/train/test_photos.hpp"
 

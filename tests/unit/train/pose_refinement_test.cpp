@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/pose_refinement.hpp"
+#include "train/optimizer/pose_refinement.hpp"
 
 #include <doctest/doctest.h>
 

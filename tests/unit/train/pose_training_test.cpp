@@ -12,7 +12,7 @@
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
 #include "train/capture_geometry.hpp"
-#include "train/pose_refinement.hpp"
+#include "train/optimizer/pose_refinement.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 #include "util/rng.hpp"

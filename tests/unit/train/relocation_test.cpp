@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/relocation.hpp"
+#include "train/density/relocation.hpp"
 
 #include <doctest/doctest.h>
 

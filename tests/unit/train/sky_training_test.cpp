@@ -18,7 +18,7 @@
 #include "raysplats/trainer.hpp"
 #include "run/model_source.hpp"
 #include "run/train_config.hpp"
-#include "train/sky_adam.hpp"
+#include "train/optimizer/sky_adam.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/step_guard.hpp"
+#include "train/optimizer/step_guard.hpp"
 
 #include <doctest/doctest.h>
 
@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "raysplats/device.hpp"
-#include "train/adam.hpp"
-#include "train/density_control.hpp"
-#include "train/image_loss.hpp"
+#include "train/density/density_control.hpp"
+#include "train/loss/image_loss.hpp"
+#include "train/optimizer/adam.hpp"
 #include "unit/fixture.hpp"
 
 using namespace raysplats;

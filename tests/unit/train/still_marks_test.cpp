@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "train/still_marks.hpp"
+#include "train/start/still_marks.hpp"
 
 #include <doctest/doctest.h>
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "scene/camera_model.hpp"
-#include "train/photo_set.hpp"
+#include "train/start/photo_set.hpp"
 
 namespace raysplats::test {
 

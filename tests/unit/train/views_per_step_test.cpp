@@ -9,7 +9,7 @@
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trainer.hpp"
-#include "train/gradient_tree.hpp"
+#include "train/optimizer/gradient_tree.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 #include "util/rng.hpp"

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "io/dataset/data_option_table.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <set>
+#include <string>
+#include <utility>
+
+#include "io/dataset/data_origin.hpp"
+#include "io/dataset/test_list.hpp"
+#include "raysplats/error.hpp"
+#include "util/number_text.hpp"
+#include "util/utf8.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr double kMostDownscale = 1024;
+
+void add_downscale_option(OptionTable& table, DatasetOptions& options) {
+  table.add(
+      "downscale",
+      "image sizes are divided by this; auto = 1, but to train on photos that are more than a "
+      "quarter larger than 1600 pixels on their longer side (with --time on fewer, by the time) "
+      "what reduces them to that, which the run's configuration then names",
+      [&options](const OptionTable::Values& values) {
+        const std::string& value = option_value("downscale", values);
+        options.downscale =
+            value == "auto" ? 0 : option_number<double>("downscale", value, 1, kMostDownscale);
+      },
+      [&options] {
+        return options.downscale == 0 ? toml_text("auto") : fmt::format("{}", options.downscale);
+      });
+}
+
+// That configurations, which keep the names, can hold them.
+const std::set<std::string>& storable(const std::set<std::string>& names) {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 18;  // checkpoints hold a configuration too
+  const std::string text = io::text_of(names);
+  const bool plain =
+      is_utf8(text) && text.find(kTomlLines) == std::string::npos &&
+      std::none_of(text.begin(), text.end(), [](char c) {
+        return (static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t') || c == 0x7f;
+      });
+  if (!plain || text.size() > kMostBytes) {
+    throw UsageError(fmt::format(
+        "The option 'test-list' names a text file of UTF-8 with a photo's name in each line, "
+        "without control characters and {}, and of at most {} bytes: give such a file",
+        kTomlLines, kMostBytes));
+  }
+  return names;
+}
+
+void add_test_list_option(OptionTable& table, DatasetOptions& options) {
+  table.add(
+      "test-list",
+      "text file with the names of the photos that are held out, one a line, in place of those "
+      "that test-every and files of the data set say; the run's configuration then has the names "
+      "themselves",
+      [&options](const OptionTable::Values& values) {
+        const std::string& value = option_value("test-list", values);
+        options.test_list.reset();
+        if (value.empty()) return;
+        const bool is_list = value.find('\n') != std::string::npos;
+        options.test_list = storable(is_list ? io::names_in(value) : read_test_list(value));
+      },
+      [&options] {
+        return options.test_list ? toml_lines(io::text_of(*options.test_list)) : toml_text("");
+      });
+}
+
+void add_origin_option(OptionTable& table, DatasetOptions& options) {
+  table.add(
+      "origin",
+      "\"x,y,z\" in the data set's coordinates, from which the model's positions count; \"auto\" = "
+      "0, but near the cameras where the scene lies so far from 0 that single precision would blur "
+      "it (surveyed captures), which the run's configuration then names",
+      [&options](const OptionTable::Values& values) {
+        if (values.size() == 1 && values.front() == "auto") {
+          options.origin.reset();
+          return;
+        }
+        const std::vector<std::string> parts = option_items("origin", values);
+        std::array<double, 3> origin{};
+        for (std::size_t k = 0; k < parts.size() && k < origin.size(); ++k)
+          origin[k] =
+              option_number<double>("origin", parts[k], -io::kFarthestOrigin, io::kFarthestOrigin);
+        if (parts.size() != origin.size()) {
+          throw UsageError(fmt::format("The option 'origin' is auto or three numbers, not '{}'",
+                                       fmt::join(values, " ")));
+        }
+        options.origin = origin;
+      },
+      [&options] {
+        if (!options.origin) return std::string("\"auto\"");
+        return fmt::format("[{}]", fmt::join(*options.origin, ", "));
+      });
+}
+
+}  // namespace
+
+void add_data_options(OptionTable& table, DatasetOptions& options) {
+  add_downscale_option(table, options);
+  table.number("test-every", options.test_every, 0, 1e9,
+               "every n-th view is held out when the data set has no split of its own; 0 = none");
+  add_test_list_option(table, options);
+  table.flag("undistort", options.undistort,
+             "turn photos through lenses with OpenCV distortion into pinhole pictures; false = "
+             "their own pixels and rays");
+  table.choice<MaskUse>(
+      "masks", options.masks, {{"ignore", MaskUse::kIgnore}, {"cutout", MaskUse::kCutout}},
+      "what is black in the photos' masks: ignore (it counts neither in the loss nor in metrics) "
+      "or cutout (background, as transparent pixels are)");
+  table.choice<AlphaUse>(
+      "alpha", options.alpha,
+      {{"auto", AlphaUse::kAuto}, {"ignore", AlphaUse::kIgnore}, {"cutout", AlphaUse::kCutout}},
+      "what is transparent in photos: ignore (it counts neither in the loss nor in metrics), "
+      "cutout (background) or auto (cutout where most photos have something transparent, but for "
+      "holes and a border that is the same in all)");
+  table.choice<BorderUse>(
+      "borders", options.borders, {{"auto", BorderUse::kAuto}, {"keep", BorderUse::kKeep}},
+      "black borders that all photos have, as the bars of a video or around the circle of a "
+      "fisheye: auto (they count neither in the loss nor in metrics) or keep (they are a part of "
+      "the scene)");
+  add_origin_option(table, options);
+}
+
+std::vector<OptionRow> data_option_rows(DatasetOptions& options) {
+  OptionTable table;
+  add_data_options(table, options);
+  return table.take();
+}
+
+void refuse_two_splits() {
+  throw UsageError("--test-every and --test-list contradict each other: leave one of them out");
+}
+
+DatasetOptions DataSettings::over(DatasetOptions base) const {
+  if (has("test-every")) {
+    if (has("test-list")) refuse_two_splits();
+    base.test_list.reset();
+  }
+  return GivenOptions::over(std::move(base));
+}
+
+}  // namespace raysplats

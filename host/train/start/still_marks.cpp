@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "train/start/still_marks.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <glm/geometric.hpp>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "scene/camera_model.hpp"
+#include "scene/statistics.hpp"
+#include "train/capture_geometry.hpp"
+#include "train/start/depth_range.hpp"
+#include "util/parallel.hpp"
+
+namespace raysplats {
+namespace {
+
+constexpr std::size_t kLeastPhotos = 12;
+// Difference of a channel between the neighbours on either side, along the edge's direction. Noise
+// of JPEG has less.
+constexpr float kLeastStep = 12.0f / 255;
+constexpr std::size_t kOddOneIn = 10;  // photos in which an edge may be another
+constexpr int kReach = 6;              // pixels between edges of one mark
+// Unaltered captures had up to 3 such pixels together, and 10 with half as many photos; logos of
+// 10 % x 5 % 160 and more, dates of letters 3 % high 60 and more.
+constexpr std::size_t kLeastEdges = 40;
+constexpr double kLeastFacing = 0.08;  // of the edges, to each of four sides
+constexpr double kMostArea = 0.05;     // of the photo
+// What may be a thing of the scene is seen within so much of the longer side, in half of the
+// photos, at one of so many depths from near to far, in extents.
+constexpr double kNearPlace = 0.015;
+constexpr double kSeenThere = 0.5;
+constexpr std::size_t kDepths = 200;
+constexpr double kNearest = 0.01, kFarthest = 1e4;
+
+struct Edge {
+  bool found = false;
+  glm::vec2 step{0.0f};  // the typical one
+};
+
+// What a channel of a photo's pixel differs from left to right and from top to bottom.
+glm::vec2 step_at(const io::Photo& photo, int x, int y, std::size_t channel) {
+  const auto value = [&](int i, int j) -> std::optional<float> {
+    const std::array<float, 4> rgba = photo.at(i, j);
+    if (rgba[3] < 0.5f || photo.weight(i, j) < 0.5f) return std::nullopt;
+    return rgba[channel];
+  };
+  const auto left = value(x - 1, y), right = value(x + 1, y);
+  const auto above = value(x, y - 1), below = value(x, y + 1);
+  // What masks leave out tells of no edge.
+  if (!left || !right || !above || !below) return glm::vec2(0.0f);
+  return {*right - *left, *below - *above};
+}
+
+float middle_of(std::vector<float>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// An edge that most photos have there.
+Edge common_edge(std::span<const SmallPhoto> photos, int x, int y) {
+  std::vector<glm::vec2> steps(photos.size());
+  std::vector<float> values(photos.size());
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    for (std::size_t i = 0; i < photos.size(); ++i)
+      steps[i] = step_at(*photos[i].picture, x, y, channel);
+    glm::vec2 typical;
+    for (const int axis : {0, 1}) {
+      for (std::size_t i = 0; i < steps.size(); ++i) values[i] = steps[i][axis];
+      typical[axis] = middle_of(values);
+    }
+    const float size = glm::length(typical);
+    if (size < kLeastStep) continue;
+    std::size_t odd = 0;
+    for (const glm::vec2& step : steps) odd += glm::dot(step, typical) < kLeastStep * size ? 1 : 0;
+    if (odd * kOddOneIn <= photos.size()) return {true, typical};
+  }
+  return {};
+}
+
+// The edges of one mark.
+struct Cluster {
+  StillMark mark;
+  std::array<std::size_t, 4> facing{};  // right, left, down, up
+
+  void add(int x, int y, const glm::vec2& step) {
+    if (mark.edges++ == 0) mark.low = mark.high = {x, y};
+    mark.low = {std::min(mark.low.x, x), std::min(mark.low.y, y)};
+    mark.high = {std::max(mark.high.x, x), std::max(mark.high.y, y)};
+    const bool across = std::abs(step.x) > std::abs(step.y);
+    ++facing[across ? (step.x > 0 ? 0 : 1) : (step.y > 0 ? 2 : 3)];
+  }
+  bool is_closed() const {
+    return *std::min_element(facing.begin(), facing.end()) >=
+           kLeastFacing * static_cast<double>(mark.edges);
+  }
+};
+
+// Edges that lie near to each other.
+std::vector<Cluster> clusters_of(std::vector<Edge> edges, int width, int height) {
+  std::vector<Cluster> out;
+  std::vector<std::pair<int, int>> open;
+  const auto take = [&](int x, int y) {
+    Edge& edge = edges[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                       static_cast<std::size_t>(x)];
+    if (!std::exchange(edge.found, false)) return;
+    out.back().add(x, y, edge.step);
+    open.emplace_back(x, y);
+  };
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      out.emplace_back();
+      take(x, y);
+      while (!open.empty()) {
+        const auto [i, j] = open.back();
+        open.pop_back();
+        for (int v = std::max(0, j - kReach); v <= std::min(height - 1, j + kReach); ++v) {
+          for (int u = std::max(0, i - kReach); u <= std::min(width - 1, i + kReach); ++u)
+            take(u, v);
+        }
+      }
+      if (out.back().mark.edges < kLeastEdges) out.pop_back();
+    }
+  }
+  return out;
+}
+
+// Whether a thing of the scene may be seen at the same place of most photos.
+bool may_be_seen(std::span<const SmallPhoto> photos, const glm::dvec2& place, double extent) {
+  const CameraRay ray = camera_ray(photos.front().camera, place.x, place.y);
+  if (!ray.valid) return true;
+  const double near = kNearPlace * kMarkSide;
+  const DepthRange depths{kNearest * extent, extent, kFarthest * extent, false};
+  for (std::size_t step = 0; step < kDepths; ++step) {
+    const glm::dvec3 world = ray.origin + depths.at(step, kDepths) * ray.direction;
+    std::size_t there = 0;
+    for (const SmallPhoto& photo : photos) {
+      const auto seen = photo.sees(world);
+      there += seen && glm::distance(*seen, place) <= near ? 1 : 0;
+    }
+    if (static_cast<double>(there) >= kSeenThere * static_cast<double>(photos.size())) return true;
+  }
+  return false;
+}
+
+// The photos of the size that most have.
+std::vector<SmallPhoto> of_one_size(std::span<const SmallPhoto> photos) {
+  std::map<std::pair<int, int>, std::vector<SmallPhoto>> sizes;
+  for (const SmallPhoto& photo : photos)
+    sizes[{photo.picture->width, photo.picture->height}].push_back(photo);
+  if (sizes.empty()) return {};
+  return std::max_element(
+             sizes.begin(), sizes.end(),
+             [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); })
+      ->second;
+}
+
+}  // namespace
+
+std::vector<StillMark> still_marks(std::span<const SmallPhoto> all) {
+  const std::vector<SmallPhoto> photos = of_one_size(all);
+  if (photos.size() < kLeastPhotos) return {};
+  const int width = photos.front().picture->width, height = photos.front().picture->height;
+  std::vector<Edge> edges(photos.front().picture->pixels());
+  in_parallel(static_cast<std::size_t>(height), [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    if (y == 0 || y == height - 1) return;
+    for (int x = 1; x < width - 1; ++x) {
+      edges[row * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)] =
+          common_edge(photos, x, y);
+    }
+  });
+  std::vector<Camera> cameras;
+  cameras.reserve(photos.size());
+  for (const SmallPhoto& photo : photos) cameras.push_back(photo.camera);
+  const double extent = camera_extent(cameras);
+  std::vector<StillMark> out;
+  for (const Cluster& cluster : clusters_of(std::move(edges), width, height)) {
+    const StillMark& mark = cluster.mark;
+    const glm::dvec2 size = mark.high - mark.low + 1;
+    if (!cluster.is_closed() || size.x * size.y > kMostArea * width * height) continue;
+    if (may_be_seen(photos, glm::dvec2(mark.low) + 0.5 * size, extent)) continue;
+    out.push_back(mark);
+  }
+  std::sort(out.begin(), out.end(),
+            [](const StillMark& a, const StillMark& b) { return a.edges > b.edges; });
+  return out;
+}
+
+}  // namespace raysplats
