@@ -224,6 +224,7 @@ void apply_run_text(CLI::App& app,
   if (found.count("borders") == 0 && !given("borders")) options.data.borders = BorderUse::kKeep;
   if (found.count("photo-points") == 0 && !given("photo-points")) options.photo_points = false;
   if (found.count("color-range") == 0 && !given("color-range")) options.color_range = 1;
+  if (found.count("alpha-weight") == 0 && !given("alpha-weight")) options.alpha_weight = 0;
   if (found.count("strategy") > 0) return;
   // The run is older than these keys: it goes on as it began.
   if (!given("strategy")) options.strategy = DensityStrategy::kAdc;

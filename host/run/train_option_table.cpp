@@ -262,7 +262,6 @@ void add_loss_options(TrainTable& t, TrainOptions& o) {
   t.number("alpha-weight", o.alpha_weight, 0, 1e3,
            "weight of the mean error of coverage in the loss, where photos are cut out: what has "
            "the background's colour is part of the model too, and holes stay open");
-
   t.flag("exposure", o.exposure,
          "find an affine colour (3 x 4) for each training photo too, for captures whose exposure "
          "or white balance changes; their mean stays the identity, which other views are shown "

@@ -101,8 +101,9 @@ void warn_of_inverted_masks(const Dataset& dataset, const MaskedOut& masked) {
   const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
   const auto first = std::find_if(dataset.views.begin(), dataset.views.end(), has_mask);
   spdlog::warn(
-      "the masks, {} among them, seem to be inverted: they leave out {:.0f} % of {}; what is black "
-      "in a mask does not count, so give masks that are black where photos are to be left out",
+      "the masks, {} among them, seem to be inverted: they leave out {:.0f} % of {}; give masks "
+      "that "
+      "are black where photos are to be left out",
       first->mask_path.string(), 100 * (told ? masked.points : masked.pixels),
       told ? "the places where photos show sparse points"
            : "the photos, and what they keep lies elsewhere in each");
@@ -110,7 +111,8 @@ void warn_of_inverted_masks(const Dataset& dataset, const MaskedOut& masked) {
 
 // Photos of the size at which marks are looked for, however small the run has them.
 std::vector<SmallPhoto> photos_for_marks(const Dataset& dataset,
-                                         std::span<const std::size_t> views) {
+                                         std::span<const std::size_t> views,
+                                         const ReadingProgress& progress) {
   Dataset chosen;
   std::vector<std::size_t> all;
   for (const std::size_t i : views) {
@@ -122,14 +124,14 @@ std::vector<SmallPhoto> photos_for_marks(const Dataset& dataset,
     all.push_back(all.size());
     chosen.views.push_back(std::move(view));
   }
-  return load_small_photos(chosen, all, kMarkSide);
+  return load_small_photos(chosen, all, kMarkSide, progress);
 }
 
 void warn_of_marks(std::span<const SmallPhoto> read) {
   const std::vector<StillMark> marks = still_marks(read);
   if (marks.empty()) return;
   const StillMark& mark = marks.front();
-  const glm::dvec2 size(read.front().camera.width, read.front().camera.height);
+  const glm::dvec2 size(mark.size);
   const glm::dvec2 low = 100.0 * glm::dvec2(mark.low) / size;
   const glm::dvec2 high = 100.0 * glm::dvec2(mark.high + 1) / size;
   spdlog::warn(
@@ -345,11 +347,13 @@ void Trainer::Impl::require_depth_gradients() const {
 
 // What photos that were read for the start tell of faults of the capture: as many as there are.
 void Trainer::Impl::warn_of_photos() {
-  photos(PhotoChoice::kSome);
+  if (small_photos.empty()) photos(PhotoChoice::kSome);
   const auto& [count, read] = *small_photos.rbegin();
-  const std::vector<std::size_t> views = evenly_spread(first_views(), count);
-  warn_of_grey_photos(read, views.size());
-  warn_of_marks(photos_for_marks(dataset, evenly_spread(first_views(), kMarkPhotos)));
+  const std::vector<std::size_t> all = first_views();
+  const std::vector<std::size_t> views = evenly_spread(all, count);
+  warn_of_grey_photos(read, all.size());
+  warn_of_marks(photos_for_marks(dataset, evenly_spread(all, kMarkPhotos),
+                                 {shows_progress ? stderr : nullptr}));
   warn_of_inverted_masks(dataset, masked_out(dataset, read, views, options.seed));
 }
 
@@ -417,7 +421,7 @@ void Trainer::Impl::start() {
     upload_first_model(most);
     choose_background();
     choose_color_range();
-    warn_of_photos();
+    if (ranks.leads()) warn_of_photos();
   }
   small_photos.clear();
   warn_of_strays(train_cameras);

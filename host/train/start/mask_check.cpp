@@ -26,7 +26,7 @@ constexpr double kNearest = 0.02, kFarthest = 100;
 
 constexpr std::size_t kFewPhotos = 6;  // fewer agree by chance
 constexpr std::size_t kFewSeen = 200;
-// Unaltered captures: 0.01 and 0.08 of the points and 0.97 and more agreed; their inverted masks
+// Unaltered captures: 0.01 and 0.08 of the points and 0.95 and more agreed; their inverted masks
 // 0.93 and more of the points, and people's that are inverted 0.2 to 0.3 agreed.
 constexpr double kMostLost = 0.75;
 constexpr double kPatches = 0.6;       // agreed less is of patches

@@ -62,13 +62,33 @@ float middle_of(std::vector<float>& values) {
   return *middle;
 }
 
+// The steps of a channel in all photos; false, and not all of them, where too many are no edge.
+bool are_edges(std::span<const SmallPhoto> photos,
+               int x,
+               int y,
+               std::size_t channel,
+               std::vector<glm::vec2>& steps) {
+  std::size_t odd = 0;
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    steps[i] = step_at(*photos[i].picture, x, y, channel);
+    odd += glm::length(steps[i]) < kLeastStep ? 1 : 0;
+    if (odd * kOddOneIn > photos.size()) return false;
+  }
+  return true;
+}
+
+// What the search at a pixel works with.
+struct Steps {
+  std::vector<glm::vec2> steps;
+  std::vector<float> values;
+  explicit Steps(std::size_t photos) : steps(photos), values(photos) {}
+};
+
 // An edge that most photos have there.
-Edge common_edge(std::span<const SmallPhoto> photos, int x, int y) {
-  std::vector<glm::vec2> steps(photos.size());
-  std::vector<float> values(photos.size());
+Edge common_edge(std::span<const SmallPhoto> photos, int x, int y, Steps& work) {
+  auto& [steps, values] = work;
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    for (std::size_t i = 0; i < photos.size(); ++i)
-      steps[i] = step_at(*photos[i].picture, x, y, channel);
+    if (!are_edges(photos, x, y, channel, steps)) continue;
     glm::vec2 typical;
     for (const int axis : {0, 1}) {
       for (std::size_t i = 0; i < steps.size(); ++i) values[i] = steps[i][axis];
@@ -134,7 +154,8 @@ std::vector<Cluster> clusters_of(std::vector<Edge> edges, int width, int height)
 bool may_be_seen(std::span<const SmallPhoto> photos, const glm::dvec2& place, double extent) {
   const CameraRay ray = camera_ray(photos.front().camera, place.x, place.y);
   if (!ray.valid) return true;
-  const double near = kNearPlace * kMarkSide;
+  const Camera& camera = photos.front().camera;
+  const double near = kNearPlace * std::max(camera.width, camera.height);
   const DepthRange depths{kNearest * extent, extent, kFarthest * extent, false};
   for (std::size_t step = 0; step < kDepths; ++step) {
     const glm::dvec3 world = ray.origin + depths.at(step, kDepths) * ray.direction;
@@ -170,9 +191,10 @@ std::vector<StillMark> still_marks(std::span<const SmallPhoto> all) {
   in_parallel(static_cast<std::size_t>(height), [&](std::size_t row) {
     const int y = static_cast<int>(row);
     if (y == 0 || y == height - 1) return;
+    Steps work(photos.size());
     for (int x = 1; x < width - 1; ++x) {
       edges[row * static_cast<std::size_t>(width) + static_cast<std::size_t>(x)] =
-          common_edge(photos, x, y);
+          common_edge(photos, x, y, work);
     }
   });
   std::vector<Camera> cameras;
@@ -186,6 +208,7 @@ std::vector<StillMark> still_marks(std::span<const SmallPhoto> all) {
     if (!cluster.is_closed() || size.x * size.y > kMostArea * width * height) continue;
     if (may_be_seen(photos, glm::dvec2(mark.low) + 0.5 * size, extent)) continue;
     out.push_back(mark);
+    out.back().size = {width, height};
   }
   std::sort(out.begin(), out.end(),
             [](const StillMark& a, const StillMark& b) { return a.edges > b.edges; });

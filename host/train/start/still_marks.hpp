@@ -18,6 +18,7 @@ inline constexpr int kMarkSide = 400;
 struct StillMark {
   glm::ivec2 low{0}, high{0};  ///< its first and its last pixel
   std::size_t edges = 0;       ///< pixels on its edges
+  glm::ivec2 size{0};          ///< of the photos that have it
 };
 
 /// What stands at the same pixels of most photos and is no part of the scene, as a logo, a date or

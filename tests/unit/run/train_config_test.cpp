@@ -448,6 +448,17 @@ TEST_CASE("a resumed run keeps its options below those of a file and of the comm
     CHECK(kept.validate_views == 2);
   }
   CHECK(resumed(folder / "none").iterations == TrainOptions().iterations);
+
+  // A run that is older than a key goes on without what that would change.
+  CHECK(resumed(folder / "run").alpha_weight == TrainOptions().alpha_weight);
+  std::string older = to_toml(of_run);
+  const std::size_t begin = older.find("alpha-weight");
+  REQUIRE(begin != std::string::npos);
+  older.erase(begin, older.find('\n', begin) + 1 - begin);
+  std::filesystem::create_directories(folder / "older");
+  folder.write("older/config.toml", older);
+  CHECK(resumed(folder / "older").alpha_weight == 0);
+  CHECK(resumed(folder / "older", {"--alpha-weight", "0.5"}).alpha_weight == 0.5);
   CHECK_THROWS_AS(resumed(folder / "run", {"--validate-views", "0", "--patience", "2"}),
                   UsageError);
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
+#include <utility>
 #include <vector>
 
 #include "unit/train/test_photos.hpp"
@@ -69,6 +70,12 @@ TEST_CASE("a date that all photos have at the same pixels is a mark, and a scene
   CHECK(std::abs(marks[0].high.x - 357) <= 2);
   CHECK(std::abs(marks[0].low.y - 270) <= 1);
   CHECK(std::abs(marks[0].high.y - 281) <= 1);
+  // Its pixels are those of the photos that have it, whatever comes first.
+  std::vector<Camera> mixed = around(16);
+  std::swap(mixed.front().width, mixed.front().height);
+  const std::vector<StillMark> again = found(mixed, dated);
+  REQUIRE(again.size() == 1);
+  CHECK(again[0].size == glm::ivec2(kWidth, kHeight));
   CHECK(found(around(16), pattern).empty());
 }
 
