@@ -71,7 +71,7 @@ struct Trainer::Impl::Pilot {
   double start_seconds = 0;  // of making the first model
   double photo_seconds = 0;  // that a photo adds to the run
   double seconds = 0;        // all of it
-  double opaque_share = 1;   // of the photos' pixels
+  double body_share = 1;     // of the photos' pixels
   std::size_t first = 0;     // Gaussians of the start
   std::size_t most = 0;      // that it may have had
 };
@@ -101,7 +101,7 @@ double Trainer::Impl::predicted_seconds(const Pilot& pilot,
   const double first = std::min(static_cast<double>(pilot.first), kFillShare * limit);
   const auto photos = static_cast<double>(
       std::min(iterations * options.views_per_step, static_cast<std::int64_t>(train_views.size())));
-  const RateCurve rates = expected_rates(pilot.at_start, pilot.at_full_size, pilot.opaque_share);
+  const RateCurve rates = expected_rates(pilot.at_start, pilot.at_full_size, pilot.body_share);
   return pilot.start_seconds + photos * pilot.photo_seconds +
          pilot.per_work * run_work(shaped, options.views_per_step * mean_pixels(train_cameras),
                                    rates, first, limit);
@@ -250,7 +250,7 @@ Trainer::Impl::Pilot Trainer::Impl::run_pilot(double seconds, std::optional<doub
   pilot.start_seconds = ranks.broadcast_value(0, timer.seconds());
   upload_first_model(most);
   pilot.first = gaussians.count;
-  if (cut_out) pilot.opaque_share = opaque_share(photos(PhotoChoice::kAll));
+  if (cut_out) pilot.body_share = body_share(photos(PhotoChoice::kAll));
   context.finish_builds();  // compilers would slow down the steps of a CPU
   try {
     time_steps(seconds, run_time, pilot);

@@ -278,7 +278,7 @@ std::size_t Trainer::Impl::most_gaussians(std::int64_t iterations) {
   double pixels = 0;
   for (const Camera& camera : train_cameras) pixels += static_cast<double>(pixel_count(camera));
   pixels /= static_cast<double>(train_cameras.size());
-  if (cut_out) pixels *= opaque_share(photos(PhotoChoice::kAll));
+  if (cut_out) pixels *= body_share(photos(PhotoChoice::kAll));
   const std::size_t fitting =
       gaussians_that_fit(options, demand(fitted_limit(pixels, iterations)), context.device());
   return std::max<std::size_t>(1, ranks.all_reduce_min(fitting));
@@ -371,7 +371,8 @@ Gaussians Trainer::Impl::new_model(std::size_t most) {
   if (model.size() > 0) return model;
   if (options.bounds)
     throw UsageError("No Gaussian of the start lies within --bounds: give a larger box");
-  const double shown = opaque_share(photos(PhotoChoice::kAll));
+  const std::vector<SmallPhoto>& all = photos(PhotoChoice::kAll);
+  const double shown = cut_out ? body_share(all) : opaque_share(all);
   if (shown < kLeastShown) refuse_transparent(shown);
   throw UsageError("The first model has no Gaussians: use --init random");
 }

@@ -18,6 +18,8 @@
 namespace raysplats {
 namespace {
 
+constexpr float kOpaque = 0.5f;  // what pixels at a body's outline have in the mean
+
 constexpr std::size_t kColorBins = 32;  // per channel
 constexpr double kSharedColor = 0.2;    // share of the pixels that makes a colour the ground's
 
@@ -57,6 +59,21 @@ struct ColorSum {
     weight += share;
   }
 };
+
+// Mean share of the pixels of which it holds.
+template <class Holds>
+double mean_share(std::span<const SmallPhoto> photos, const Holds& holds) {
+  double sum = 0;
+  for (const SmallPhoto& photo : photos) {
+    std::size_t count = 0;
+    for (int y = 0; y < photo.picture->height; ++y) {
+      for (int x = 0; x < photo.picture->width; ++x) count += holds(photo, x, y) ? 1 : 0;
+    }
+    const std::size_t pixels = std::max<std::size_t>(photo.picture->pixels(), 1);
+    sum += static_cast<double>(count) / static_cast<double>(pixels);
+  }
+  return photos.empty() ? 1.0 : sum / static_cast<double>(photos.size());
+}
 
 }  // namespace
 
@@ -144,7 +161,6 @@ void balance(std::span<SmallPhoto> photos) {
 }
 
 bool SmallPhoto::shows_body(int x, int y) const {
-  constexpr float kOpaque = 0.5f;  // what pixels at a body's outline have in the mean
   const float alpha = picture->at(x, y)[3];
   if (alpha >= kOpaque || alpha <= kLeastAlpha) return alpha >= kOpaque;
   for (int v = std::max(y - 1, 0); v <= std::min(y + 1, picture->height - 1); ++v) {
@@ -156,16 +172,14 @@ bool SmallPhoto::shows_body(int x, int y) const {
 }
 
 double opaque_share(std::span<const SmallPhoto> photos) {
-  double sum = 0;
-  for (const SmallPhoto& photo : photos) {
-    std::size_t opaque = 0;
-    for (int y = 0; y < photo.picture->height; ++y) {
-      for (int x = 0; x < photo.picture->width; ++x) opaque += photo.shows_body(x, y) ? 1 : 0;
-    }
-    const std::size_t pixels = std::max<std::size_t>(photo.picture->pixels(), 1);
-    sum += static_cast<double>(opaque) / static_cast<double>(pixels);
-  }
-  return photos.empty() ? 1.0 : sum / static_cast<double>(photos.size());
+  return mean_share(photos, [](const SmallPhoto& photo, int x, int y) {
+    return photo.picture->at(x, y)[3] >= kOpaque;
+  });
+}
+
+double body_share(std::span<const SmallPhoto> photos) {
+  return mean_share(photos,
+                    [](const SmallPhoto& photo, int x, int y) { return photo.shows_body(x, y); });
 }
 
 bool shows_anything(std::span<const SmallPhoto> photos) {

@@ -58,8 +58,11 @@ std::vector<SmallPhoto> load_small_photos(const Dataset& dataset,
 /// of which nothing counts keeps its own.
 void balance(std::span<SmallPhoto> photos);
 
-/// Mean share of the pixels that show a body.
+/// Mean share of the pixels that show something: alpha at least one half.
 double opaque_share(std::span<const SmallPhoto> photos);
+
+/// Mean share of the pixels of cut-out photos that show a body.
+double body_share(std::span<const SmallPhoto> photos);
 
 /// Whether a pixel of a photo shows anything, however faint: alpha above 0.
 bool shows_anything(std::span<const SmallPhoto> photos);

@@ -69,13 +69,15 @@ TEST_CASE("carving fills the body that the photos show, in its colour") {
 
 TEST_CASE("a body that is half transparent all over counts as a body") {
   std::vector<SmallPhoto> photos = ring_of_ball();
-  const double opaque = opaque_share(photos), range = color_range(photos);
+  const double body = body_share(photos), range = color_range(photos);
+  CHECK(body == doctest::Approx(opaque_share(photos)).epsilon(0.01));
   for (SmallPhoto& photo : photos) {
     auto veiled = std::make_shared<io::Photo>(*photo.picture);
     for (std::uint32_t& word : veiled->words) word = (word & 0xffffffu) | (word >> 25) << 24;
     photo.picture = veiled;
   }
-  CHECK(opaque_share(photos) == doctest::Approx(opaque).epsilon(0.25));  // without its outline
+  CHECK(opaque_share(photos) == 0);
+  CHECK(body_share(photos) == doctest::Approx(body).epsilon(0.25));  // without its outline
   CHECK(color_range(photos) == doctest::Approx(range).epsilon(0.02));
   const PointCloud points = carved_points(photos, {{0, 0, 0}, 1.2}, 100, 7);
   REQUIRE(points.size() == 100);
