@@ -11,7 +11,7 @@
 namespace raysplats {
 
 /// Photos that tell of marks, and their longer side, in pixels.
-inline constexpr std::size_t kMarkPhotos = 24;
+inline constexpr std::size_t kMarkPhotos = 16;
 inline constexpr int kMarkSide = 400;
 
 /// A place that looks the same in all photos: a box of pixels.
