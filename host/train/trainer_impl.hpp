@@ -219,6 +219,7 @@ struct Trainer::Impl {
   void check_fits(const Checkpoint& checkpoint) const;
   void choose_folder(const std::filesystem::path& place, const Checkpoint& checkpoint);
   void restore_parts(const Checkpoint& checkpoint);
+  void check_lists(const Checkpoint& checkpoint) const;
   void check_data_options(const Checkpoint& checkpoint) const;
   void check_newer_models(std::int64_t from) const;
   void write_state(const std::filesystem::path& path);

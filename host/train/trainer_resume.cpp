@@ -32,6 +32,13 @@ auto reading(const DatasetOptions& o) {
                     o.alpha);
 }
 
+// Whether lists beside its COLMAP model divide a data set, which programs without `--test-list` did
+// not heed. Of several photos counting would have held out some.
+bool divided_by_lists(const Dataset& dataset, const DatasetOptions& options) {
+  return dataset.kind == DatasetKind::kColmap && dataset.read_as && !options.test_list &&
+         options.test_every > 0 && dataset.test_every == 0 && dataset.views.size() > 1;
+}
+
 }  // namespace
 
 // The state between two steps, or with density control still to come.
@@ -144,14 +151,16 @@ void Trainer::Impl::check_data_options(const Checkpoint& checkpoint) const {
   if (!before.data.test_list && !now.data.test_list)
     differs("test-every", before.data.test_every, now.data.test_every);
   if (!checkpoint.split.empty() && checkpoint.split != split_fingerprint(dataset)) {
-    const bool by_list = before.data.test_list != now.data.test_list;
-    throw UsageError(
-        fmt::format("The checkpoint of iteration {} was made with other photos held out than {} "
-                    "now: {}, or start a new run with --init",
-                    checkpoint.iteration,
-                    by_list ? "'test-list' says" : "the files of " + dataset.root.string() + " say",
-                    by_list ? "leave that to the run's configuration, which has their names"
-                            : "bring their lists back, or name the photos by --test-list"));
+    const bool by_files = before.data.test_list == now.data.test_list;
+    throw UsageError(fmt::format(
+        "The checkpoint of iteration {} was made with other photos held out than {} now: {}, or "
+        "start a new run with --init",
+        checkpoint.iteration,
+        by_files             ? "the files of " + dataset.root.string() + " say"
+        : now.data.test_list ? "'test-list' says"
+                             : "'test-every' says",
+        by_files ? "bring their lists back, or name the photos by --test-list"
+                 : "leave that to the run's configuration, which says what it held out"));
   }
   differs("undistort", before.data.undistort, now.data.undistort);
   differs("validate-views", before.validate_views, now.validate_views);
@@ -209,6 +218,19 @@ void Trainer::Impl::resume(const std::filesystem::path& source) {
   }
 }
 
+// Runs of programs that did not heed lists beside COLMAP models held out other photos, and do not
+// say which.
+void Trainer::Impl::check_lists(const Checkpoint& checkpoint) const {
+  if (!checkpoint.split.empty() || checkpoint.config.empty()) return;
+  const DatasetOptions before = parse_train_config(checkpoint.config).data;
+  if (before.test_list || before.test_every == 0 || !divided_by_lists(dataset, options.data))
+    return;
+  throw UsageError(fmt::format(
+      "The checkpoint of iteration {} was made before lists of test photos beside COLMAP models "
+      "counted, as {} has: move the list away, or start a new run with --init",
+      checkpoint.iteration, dataset.root.string()));
+}
+
 // Whether the state is one of this run: of its seed, data, options of data and length.
 void Trainer::Impl::check_fits(const Checkpoint& checkpoint) const {
   if (checkpoint.seed != options.seed) {
@@ -216,6 +238,7 @@ void Trainer::Impl::check_fits(const Checkpoint& checkpoint) const {
         "The checkpoint was made with seed {}, not {}: resume with the configuration of the run",
         checkpoint.seed, options.seed));
   }
+  check_lists(checkpoint);
   if (!checkpoint.dataset.empty() && checkpoint.dataset != fingerprint &&
       checkpoint.dataset != fingerprint_for(checkpoint.config, dataset)) {
     throw UsageError(

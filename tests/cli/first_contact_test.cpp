@@ -158,7 +158,7 @@ TEST_CASE("a run holds out what its list names, whatever becomes of the file") {
   write_file(list, "r_2.png\ntest/r_1\n");
   succeed(training(run, 6) + Words{"--resume", run} + listed);
   check_refused(training(run, 8) + Words{"--resume", run, "--test-every", "8"}, 2,
-                "other photos held out");
+                "other photos held out than 'test-every' says now");
 
   const std::string other = folder / "other";
   for (const Words& command : {training(other, 2), Words{"info", data()},

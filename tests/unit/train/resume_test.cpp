@@ -441,6 +441,33 @@ TEST_CASE("a run is not resumed where files of its data set hold out other photo
   CHECK(contains(message_of<UsageError>(resume), "leave that to the run's configuration"));
 }
 
+TEST_CASE("a run of a program that knew no lists beside COLMAP models is not resumed with one") {
+  const Place place;
+  Dataset data = load_dataset(place.folder / "data");
+  data.kind = DatasetKind::kColmap;  // as it would be read from such files
+  data.test_every = 8;
+  TrainOptions options = growing();
+  Trainer(shared_test_context(), data, options, place.run("run")).run(false);
+  const fs::path file = list_checkpoints(place.run("run")).back();
+  Checkpoint older = read_checkpoint(file);
+  older.split.clear();
+  CheckpointSections sections;
+  for (const auto& [name, numbers] : older.sections)
+    sections[name] = [&numbers = numbers] { return numbers; };
+  write_checkpoint(file, older, sections);
+  const auto resume = [&] {
+    Trainer(shared_test_context(), data, options, place.run("run")).resume("latest");
+  };
+  resume();
+  data.test_every = 0;
+  const std::string refusal = "was made before lists of test photos beside COLMAP models counted";
+  CHECK(contains(message_of<UsageError>(resume), refusal));
+  for (View& view : data.views) view.test = false;  // all are to be trained on
+  CHECK(contains(message_of<UsageError>(resume), refusal));
+  data.views.pop_back();  // the list leaves one out
+  CHECK(contains(message_of<UsageError>(resume), refusal));
+}
+
 TEST_CASE("a run that does not say how its data set was read goes on, and is warned of") {
   const Place place;
   DatasetOptions smaller;
