@@ -38,6 +38,10 @@ bool ends_path(const std::string& path, const std::string& end) {
          (path.size() == end.size() || path[path.size() - end.size() - 1] == '/');
 }
 
+std::optional<std::string> only(const std::set<std::string>& names) {
+  return names.size() == 1 ? std::optional(*names.begin()) : std::nullopt;
+}
+
 std::set<std::string> read_names(TextReader reader) {
   std::set<std::string> names;
   while (reader.next_content_line())
@@ -63,22 +67,33 @@ void PhotoNames::add(const std::string& name, const std::string& written, int ra
   by_last_[last_part(written)].push_back({name, written, rank});
 }
 
+std::set<std::string> PhotoNames::names_of(std::span<const Spelling> spellings,
+                                           const std::function<bool(const Spelling&)>& fits) {
+  std::set<std::string> names;
+  for (const Spelling& each : spellings)
+    if (fits(each)) names.insert(each.name);
+  return names;
+}
+
 std::optional<std::string> PhotoNames::find(const std::string& written) const {
   const std::string wanted = inner_name(portable_path(written));
   const auto found = by_last_.find(last_part(wanted));
   if (wanted.empty() || found == by_last_.end()) return std::nullopt;
-  for (int rank = 0; rank <= kEnds; ++rank) {
-    std::set<std::string> names;
-    for (const Spelling& each : found->second) {
-      const std::string& other = each.written;
-      if (rank == kEnds ? ends_path(other, wanted) || ends_path(wanted, other)
-                        : rank == each.rank && other == wanted)
-        names.insert(each.name);
-    }
-    if (names.size() == 1) return *names.begin();
-    if (!names.empty()) return std::nullopt;
+  const std::vector<Spelling>& spellings = found->second;
+  for (int rank = 0; rank < kEnds; ++rank) {
+    const std::set<std::string> names = names_of(spellings, [&](const Spelling& each) {
+      return each.rank == rank && each.written == wanted;
+    });
+    if (!names.empty()) return only(names);
   }
-  return std::nullopt;
+  // Of photos that a path ends in the names of, that of the longest is meant.
+  std::size_t longest = 0;
+  for (const Spelling& each : spellings)
+    if (ends_path(wanted, each.written)) longest = std::max(longest, each.written.size());
+  return only(names_of(spellings, [&](const Spelling& each) {
+    return longest > 0 ? each.written.size() == longest && ends_path(wanted, each.written)
+                       : ends_path(each.written, wanted);
+  }));
 }
 
 std::set<std::string> names_in(std::string_view text) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -19,8 +20,8 @@ class PhotoNames {
   explicit PhotoNames(std::span<const View> views);
 
   /// The name of the camera whose photo is meant: by that name, else by it without its extension,
-  /// else by the end of it or by a path that ends so, with its extension or without. Nothing where
-  /// that is of no photo, or of several.
+  /// else by a path that ends so, of several the longest, else by the end of it, each with its
+  /// extension or without. Nothing where that is of no photo, or of several.
   std::optional<std::string> find(const std::string& written) const;
 
  private:
@@ -30,6 +31,8 @@ class PhotoNames {
     int rank;             ///< of what is written just so; lower ones go before
   };
   void add(const std::string& name, const std::string& written, int rank);
+  static std::set<std::string> names_of(std::span<const Spelling> spellings,
+                                        const std::function<bool(const Spelling&)>& fits);
 
   std::map<std::string, std::vector<Spelling>, std::less<>> by_last_;  // part of the path
 };

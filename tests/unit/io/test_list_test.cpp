@@ -93,6 +93,16 @@ TEST_CASE("names in a list that mean no photo, or several, are counted and refus
   CHECK(contains(refusal(blender, {"r_0.png"}), "or several, 'r_0.png' the first"));
 }
 
+TEST_CASE("of photos that a path ends in, the one with the longest name is meant") {
+  const Scratch scratch;
+  write_frames(scratch, "transforms_train.json", {"a 1", "left/a 1", "left/b", "b"});
+  const auto listed = [&](const char* name) { return held_out(load_with(scratch, {name})); };
+  for (const char* name : {"left/a 1", "images/left/a 1.png", "/moved/left/a 1", "./left/a 1.png"})
+    CHECK(listed(name) == Names{"left/a 1.png"});
+  for (const char* name : {"a 1.png", "a 1", "images/a 1.png", "/moved/right/a 1"})
+    CHECK(listed(name) == Names{"a 1.png"});
+}
+
 TEST_CASE("what files hold out and a list does not name is left out") {
   const Scratch scratch;
   write_frames(scratch, "transforms_train.json", {"train/r_0", "train/r_1", "train/r_2"});
