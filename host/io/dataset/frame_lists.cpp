@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <functional>
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -58,16 +59,17 @@ void warn_of_unknown(const Lists& lists, const Names& names) {
       lists.photo, first, lists.advice);
 }
 
-void warn_of_shared(const Lists& lists) {
+void warn_of_shared(const Lists& lists, bool all) {
   std::vector<std::string> shared;
   std::set_intersection(lists.train.begin(), lists.train.end(), lists.test.begin(),
                         lists.test.end(), std::back_inserter(shared));
   if (shared.empty()) return;
   spdlog::warn(
       "{}: {} of {} names in its list of {}s to train on are in that of {}s to test too, "
-      "'{}' among them: these are held out",
+      "'{}' among them: {}",
       lists.place.string(), shared.size(), lists.train.size(), lists.photo, lists.photo,
-      shared.front());
+      shared.front(),
+      all ? "what of these --test-list does not name is left out" : "these are held out");
 }
 
 /// `keys`: the names of `views`, as the lists would have them; `names`: of all photos there are or
@@ -100,7 +102,7 @@ bool divide(const Lists& lists,
   const std::size_t count = views.size();
   views = std::move(used);
   warn_of_unknown(lists, names);
-  warn_of_shared(lists);
+  warn_of_shared(lists, all);
   if (for_validation > 0) {
     spdlog::info("{} of {} {}s of {} are for validation only and left out", for_validation, count,
                  photo, place.string());
@@ -125,28 +127,34 @@ Names texts_of(const nlohmann::json& object, const char* key) {
   return names;
 }
 
-std::optional<Lists> colmap_lists(const fs::path& model_folder, const fs::path& root) {
-  Lists lists{.place = {},
-              .photo = "photo",
-              .advice = "write them as the model does",
-              .train = {},
-              .validation = {},
-              .test = {}};
-  const fs::path test = root / "test_list.txt", train = root / "train_list.txt";
-  if (lists.place = model_folder / "test.txt"; is_file(lists.place)) {
-    lists.test = read_test_list(lists.place);
-  } else if (is_file(test) || is_file(train)) {
-    lists.place = is_file(test) ? test : train;
-    lists.test = read_if_there(test);
-    lists.train = read_if_there(train);
-  } else if (lists.place = root / "train_test_lists.json"; is_file(lists.place)) {
-    const nlohmann::json object = read_json_object(lists.place);
-    lists.test = texts_of(object, "test");
-    lists.train = texts_of(object, "train");
-  } else {
-    return std::nullopt;
-  }
-  return lists;
+/// The lists that may come with a model, those that go before others first.
+std::vector<std::function<std::optional<Lists>()>> colmap_lists(const fs::path& model_folder,
+                                                                const fs::path& root) {
+  const auto lists_of = [](fs::path place, Names train, Names test) {
+    return Lists{.place = std::move(place),
+                 .photo = "photo",
+                 .advice = "write them as the model does",
+                 .train = std::move(train),
+                 .validation = {},
+                 .test = std::move(test)};
+  };
+  return {[=]() -> std::optional<Lists> {
+            const fs::path path = model_folder / "test.txt";
+            if (!is_file(path)) return std::nullopt;
+            return lists_of(path, {}, read_test_list(path));
+          },
+          [=]() -> std::optional<Lists> {
+            const fs::path test = root / "test_list.txt", train = root / "train_list.txt";
+            if (!is_file(test) && !is_file(train)) return std::nullopt;
+            return lists_of(is_file(test) ? test : train, read_if_there(train),
+                            read_if_there(test));
+          },
+          [=]() -> std::optional<Lists> {
+            const fs::path path = root / "train_test_lists.json";
+            if (!is_file(path)) return std::nullopt;
+            const nlohmann::json object = read_json_object(path);
+            return lists_of(path, texts_of(object, "train"), texts_of(object, "test"));
+          }};
 }
 
 /// Names as the model has them.
@@ -155,6 +163,19 @@ Names spelt(const Names& list, const PhotoNames& photos) {
   for (const std::string& written : list)
     names.insert(photos.find(written).value_or(inner_name(written)));
   return names;
+}
+
+bool names_any(const Lists& lists, const Names& names) {
+  return std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+    return lists.train.contains(name) || lists.test.contains(name);
+  });
+}
+
+/// Whether the lists keep none of the photos to train on.
+bool train_on_none(const Lists& lists, const std::vector<std::string>& keys) {
+  return std::none_of(keys.begin(), keys.end(), [&](const std::string& name) {
+    return !lists.test.contains(name) && (lists.train.empty() || lists.train.contains(name));
+  });
 }
 
 }  // namespace
@@ -187,27 +208,32 @@ bool divide_by_lists(const ColmapModel& model,
                      const fs::path& root,
                      bool all,
                      std::vector<View>& views) {
-  std::optional<Lists> lists = colmap_lists(model_folder, root);
-  if (!lists) return false;
-  Names names, listed;
+  Names names;
   for (const ColmapImage& image : model.images) names.insert(inner_name(image.name));
   std::vector<std::string> keys;
   keys.reserve(views.size());
   for (const View& view : views) keys.push_back(view.camera.name);
   const PhotoNames photos(views);
-  lists->train = spelt(lists->train, photos);
-  lists->test = spelt(lists->test, photos);
-  std::set_union(lists->train.begin(), lists->train.end(), lists->test.begin(), lists->test.end(),
-                 std::inserter(listed, listed.end()));
-  if (std::none_of(listed.begin(), listed.end(),
-                   [&](const std::string& name) { return names.contains(name); })) {
-    spdlog::warn("{} names no photo of the COLMAP model {}: it is not used", lists->place.string(),
-                 model_folder.string());
-    return false;
+  for (const auto& read : colmap_lists(model_folder, root)) {
+    std::optional<Lists> lists = read();
+    if (!lists) continue;
+    lists->train = spelt(lists->train, photos);
+    lists->test = spelt(lists->test, photos);
+    const std::string place = lists->place.string();
+    if (!names_any(*lists, names)) {
+      spdlog::warn("{} names no photo of the COLMAP model {}: it is not used", place,
+                   model_folder.string());
+    } else if (!has_all(lists->train, names) && train_on_none(*lists, keys)) {
+      spdlog::warn(
+          "{} {} the COLMAP model {}: it is not used", place,
+          lists->train.empty() ? "holds out every photo of" : "leaves no photo to train on of",
+          model_folder.string());
+    } else if (divide(*lists, names, keys, all, views)) {
+      if (!all) spdlog::info("the photos that are held out are those of {}", place);
+      return true;
+    }
   }
-  if (!divide(*lists, names, keys, all, views)) return false;
-  if (!all) spdlog::info("the photos that are held out are those of {}", lists->place.string());
-  return true;
+  return false;
 }
 
 }  // namespace raysplats::io

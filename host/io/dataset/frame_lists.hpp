@@ -30,7 +30,8 @@ bool divide_by_lists(const TransformsFile& file,
 /// The same of a COLMAP model by the lists that come with it, the first of these, which a line
 /// names unless `all` is asked for: test.txt beside the model (3DGS), train_list.txt and
 /// test_list.txt (nerfstudio, NerfBaselines) and train_test_lists.json (ScanNet++) in the data
-/// set's folder. Lists of which no name is of the model's count as none.
+/// set's folder. Lists of which no name is of the model's, and those that leave nothing to train
+/// on, are passed over with a warning.
 bool divide_by_lists(const ColmapModel& model,
                      const std::filesystem::path& model_folder,
                      const std::filesystem::path& root,

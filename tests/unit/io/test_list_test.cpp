@@ -159,6 +159,59 @@ TEST_CASE("test.txt beside a COLMAP model says what is held out, as 3DGS reads i
   CHECK(log.contains("names no photo of the COLMAP model"));
 }
 
+TEST_CASE("a list that leaves no photo of a COLMAP model to train on is not used") {
+  const Colmap colmap;
+  std::string all;
+  for (const View& view : load_dataset(colmap.scratch.path()).views) all += view.camera.name + "\n";
+  const LogCapture log;
+  const auto count = [&] {
+    const Dataset dataset = load_dataset(colmap.scratch.path());
+    CHECK(dataset.test_every == 8);
+    return dataset.indices(Split::kTrain).size();
+  };
+  write_bytes(colmap.scratch / "sparse/0/test.txt", all);
+  CHECK(count() == 8);
+  CHECK(log.contains("sparse/0/test.txt holds out every photo of the COLMAP model"));
+  CHECK(load_with(colmap.scratch, {"photo 4.png"}).views.size() == 10);
+  fs::remove(colmap.scratch / "sparse/0/test.txt");
+  write_bytes(colmap.scratch / "train_list.txt", "photo 4.png\n");
+  write_bytes(colmap.scratch / "test_list.txt", "photo 4.png\nphoto 2.png\n");
+  CHECK(count() == 8);
+  CHECK(log.contains("test_list.txt leaves no photo to train on of the COLMAP model"));
+}
+
+TEST_CASE("a file that lists no photo of a COLMAP model leaves it to the next") {
+  const Colmap colmap;
+  const Names photos{"photo 2.png"};
+  write_bytes(colmap.scratch / "train_test_lists.json",
+              R"({"train": ["photo 4.png"], "test": ["photo 2.png"]})");
+  for (const std::string& text :
+       {std::string(), std::string("# notes\nto do\n"), std::string("\xff\xfe\0p\0h\0\n", 8)}) {
+    write_bytes(colmap.scratch / "sparse/0/test.txt", text);
+    write_bytes(colmap.scratch / "test_list.txt", text);
+    const LogCapture log;
+    CHECK(held_out(load_dataset(colmap.scratch.path())) == photos);
+    CHECK(log.contains("sparse/0/test.txt names no photo of the COLMAP model"));
+    CHECK(log.contains("/test_list.txt names no photo of the COLMAP model"));
+    CHECK(log.contains("held out are those of " +
+                       (colmap.scratch / "train_test_lists.json").string()));
+  }
+  write_bytes(colmap.scratch / "test_list.txt", "photo 6.png\n");
+  CHECK(held_out(load_dataset(colmap.scratch.path())) == Names{"photo 6.png"});
+}
+
+TEST_CASE("photos that lists would train on and test are said to be what becomes of them") {
+  const Colmap colmap;
+  write_bytes(colmap.scratch / "train_list.txt", "photo 4.png\nphoto 2.png\n");
+  write_bytes(colmap.scratch / "test_list.txt", "photo 2.png\n");
+  const LogCapture log;
+  (void)load_with(colmap.scratch, {"photo 4.png"});
+  CHECK(log.contains("among them: what of these --test-list does not name is left out"));
+  CHECK_FALSE(log.contains("these are held out"));
+  (void)load_dataset(colmap.scratch.path());
+  CHECK(log.contains("these are held out"));
+}
+
 TEST_CASE("lists of nerfstudio and ScanNet++ beside a COLMAP model divide its photos") {
   const Colmap colmap;
   write_bytes(colmap.scratch / "train_test_lists.json",
