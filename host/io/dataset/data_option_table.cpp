@@ -38,22 +38,30 @@ void add_downscale_option(OptionTable& table, DatasetOptions& options) {
       });
 }
 
-// That configurations, which keep the names, can hold them.
-const std::set<std::string>& storable(const std::set<std::string>& names) {
+// What of a list configurations, which keep the names, cannot hold; "" where they can.
+std::string unstorable(const std::string& text) {
   constexpr std::size_t kMostBytes = std::size_t{1} << 18;  // checkpoints hold a configuration too
-  const std::string text = io::text_of(names);
-  const bool plain =
-      is_utf8(text) && text.find(kTomlLines) == std::string::npos &&
-      std::none_of(text.begin(), text.end(), [](char c) {
-        return (static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t') || c == 0x7f;
-      });
-  if (!plain || text.size() > kMostBytes) {
-    throw UsageError(fmt::format(
-        "The option 'test-list' names a text file of UTF-8 with a photo's name in each line, "
-        "without control characters and {}, and of at most {} bytes: give such a file",
-        kTomlLines, kMostBytes));
-  }
-  return names;
+  if (text.size() > kMostBytes)
+    return fmt::format("has {} bytes of names, more than {}", text.size(), kMostBytes);
+  if (!is_utf8(text)) return "is not of UTF-8, but of UTF-16 or no text";
+  const auto is_control = [](char c) {
+    return (static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t') || c == 0x7f;
+  };
+  if (std::any_of(text.begin(), text.end(), is_control))
+    return "has control characters, as files of UTF-16 or no text do";
+  if (text.find(kTomlLines) != std::string::npos)
+    return fmt::format("has {} in a name", kTomlLines);
+  return "";
+}
+
+// `place`: what gives the names.
+const std::set<std::string>& storable(const std::set<std::string>& names,
+                                      const std::string& place) {
+  const std::string reason = unstorable(io::text_of(names));
+  if (reason.empty()) return names;
+  throw UsageError(
+      fmt::format("{} {}: 'test-list' is a text file of UTF-8 with a photo's name in each line",
+                  place, reason));
 }
 
 void add_test_list_option(OptionTable& table, DatasetOptions& options) {
@@ -67,7 +75,8 @@ void add_test_list_option(OptionTable& table, DatasetOptions& options) {
         options.test_list.reset();
         if (value.empty()) return;
         const bool is_list = value.find('\n') != std::string::npos;
-        options.test_list = storable(is_list ? io::names_in(value) : read_test_list(value));
+        options.test_list = is_list ? storable(io::names_in(value), "The list of test photos")
+                                    : storable(read_test_list(value), value);
       },
       [&options] {
         return options.test_list ? toml_lines(io::text_of(*options.test_list)) : toml_text("");

@@ -264,6 +264,16 @@ TEST_CASE("the option of a list reads a file, and holds its names from then on")
   CHECK(contains(data_error([&] { row.set({path}); }), "list.txt"));
   for (const char* bad : {"\xff\xfe\n", "a'''b\n", "\x01\n"})
     CHECK(contains(message_of<UsageError>([&] { row.set({bad}); }), "text file of UTF-8"));
+  const auto refused = [&](const std::string& text) {
+    write_bytes(path, text);
+    return message_of<UsageError>([&] { row.set({path}); });
+  };
+  CHECK(contains(refused("\xff\xfe"
+                         "a"),
+                 path + " is not of UTF-8"));
+  CHECK(contains(refused(std::string("a\0b\0", 4)), path + " has control characters"));
+  CHECK(contains(refused("a'''b"), path + " has ''' in a name"));
+  CHECK(contains(refused(std::string(300'000, 'a')), path + " has 300001 bytes of names, more"));
 }
 
 TEST_CASE(
