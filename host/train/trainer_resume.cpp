@@ -241,10 +241,16 @@ void Trainer::Impl::check_fits(const Checkpoint& checkpoint) const {
   check_lists(checkpoint);
   if (!checkpoint.dataset.empty() && checkpoint.dataset != fingerprint &&
       checkpoint.dataset != fingerprint_for(checkpoint.config, dataset)) {
-    throw UsageError(
-        fmt::format("The checkpoint of iteration {} was made with other data than {}: resume with "
-                    "the photos and cameras of the run, or start a new one with --init",
-                    checkpoint.iteration, dataset.root.string()));
+    // Lists may leave photos out.
+    const auto list_of = [](const std::string& config) {
+      return config.empty() ? std::nullopt : parse_train_config(config).data.test_list;
+    };
+    throw UsageError(fmt::format(
+        "The checkpoint of iteration {} was made with other data than {}: resume with the photos, "
+        "cameras and {} of the run, or start a new one with --init",
+        checkpoint.iteration, dataset.root.string(),
+        list_of(checkpoint.config) == options.data.test_list ? "lists of held-out photos"
+                                                             : "'test-list' or 'test-every'"));
   }
   check_data_options(checkpoint);
   if (checkpoint.iteration > last_iteration(options)) {

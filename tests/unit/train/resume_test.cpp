@@ -439,6 +439,12 @@ TEST_CASE("a run is not resumed where files of its data set hold out other photo
   CHECK(contains(message_of<UsageError>(resume), "bring their lists back"));
   data.read_as->test_list = {other.camera.name};
   CHECK(contains(message_of<UsageError>(resume), "leave that to the run's configuration"));
+  data.views.pop_back();  // which a list leaves out
+  CHECK(contains(message_of<UsageError>(resume),
+                 "resume with the photos, cameras and 'test-list' or 'test-every' of the run"));
+  data.read_as->test_list.reset();
+  CHECK(contains(message_of<UsageError>(resume),
+                 "resume with the photos, cameras and lists of held-out photos of the run"));
 }
 
 TEST_CASE("a run of a program that knew no lists beside COLMAP models is not resumed with one") {
