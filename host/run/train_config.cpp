@@ -204,6 +204,9 @@ std::set<std::string> apply_given_config(CLI::App& app,
   std::set<std::string> named =
       read_text(file_text(path), path, options,
                 [&](const std::string& key) { return chosen.contains(key) || given(key); });
+  // Its number counts as that of the command line does: in place of a run's list.
+  if (named.contains("test-every") && !named.contains("test-list") && !given("test-list"))
+    options.data.test_list.reset();
   for (const std::string& key : chosen) named.erase(key);
   return named;
 }

@@ -403,6 +403,19 @@ TEST_CASE("a resumed run keeps its options below those of a file and of the comm
   CHECK(options.seed == 8);
   CHECK(options.sh_degree == 0);
 
+  // A number goes before the run's list of test photos, as on the command line.
+  TrainOptions listed;
+  listed.data.test_list = {"a.png"};
+  folder.write("listed/config.toml", to_toml(listed));
+  folder.write("every.toml", "test-every = 4\n");
+  folder.write("both.toml", "test-every = 4\ntest-list = \"\"\"\nb.png\n\"\"\"\n");
+  const auto list_with = [&](const char* config) {
+    return resumed(folder / "listed", {"--config", (folder / config).string()}).data.test_list;
+  };
+  CHECK(resumed(folder / "listed").data.test_list == listed.data.test_list);
+  CHECK_FALSE(list_with("every.toml").has_value());
+  CHECK(list_with("both.toml") == std::set<std::string>{"b.png"});
+
   // Another length has another end, whoever gives it.
   folder.write("length.toml", "iterations = 1000\n");
   CHECK(resumed(folder / "run", {"--config", (folder / "length.toml").string()}).end_iteration ==
