@@ -387,7 +387,8 @@ EvaluationReport evaluate(const std::function<Image(const Camera&)>& render,
   const std::vector<std::size_t> views = spread(dataset.indices(split), options.max_views);
   if (views.empty()) {
     throw UsageError(fmt::format(
-        "The data set {} has no views to evaluate; choose another split or --test-every",
+        "The data set {} has no views to evaluate: choose another split, --test-every or "
+        "--test-list",
         dataset.root.string()));
   }
   if (options.align && options.together)

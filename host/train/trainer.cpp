@@ -187,8 +187,8 @@ void Trainer::Impl::check_views_and_options() const {
     const bool by_option = options.data.test_every == 1 && !test_views.empty();
     throw UsageError(fmt::format(
         "The data set {} has no training views: {}", dataset.root.string(),
-        by_list               ? "the list of test photos names all of them"
-        : by_option           ? "--test-every 1 holds all of them out"
+        by_list     ? "the list of test photos names all of them that its files do not leave out"
+        : by_option ? "--test-every 1 holds all of them out"
         : !test_views.empty() ? "its files hold all of them out; let them name some for training"
                               : "its files name none to train on"));
   }
