@@ -10,6 +10,7 @@
 #include <string>
 
 #include "raysplats/error.hpp"
+#include "run/dataset_fingerprint.hpp"
 #include "run/train_config.hpp"
 #include "shared/train_layout.h"
 #include "train/trainer_impl.hpp"
@@ -114,7 +115,7 @@ void Trainer::Impl::exchange_slots() {
 // Ranks whose data, options or models are not the same would drift apart without a word.
 void Trainer::Impl::check_ranks_agree() {
   if (ranks.size() == 1) return;
-  const std::string about = fingerprint + to_toml(options);
+  const std::string about = fingerprint + split_fingerprint(dataset) + to_toml(options);
   XXH64_hash_t hash = XXH64(about.data(), about.size(), 0);
   for_each_group(
       [&](ParameterGroup, const Buffer<float>& numbers) {
