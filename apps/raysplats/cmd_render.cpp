@@ -205,9 +205,9 @@ void render_model(const RenderFlags& options, const GlobalOptions& global) {
   const Gaussians model = in_morton_order(read_model(source.file));
   Dataset dataset;
   if (!options.data.data.empty()) {
-    DatasetOptions data = options.data.settings.over(dataset_options(source));
-    if (options.orbit) data.test_list.reset();  // it goes around all, also of other data
-    dataset = load_dataset(options.data.data, data);
+    const bool all = options.orbit || options.ellipse || options.spiral || options.interpolate ||
+                     options.data.chosen_split() == Split::kAll;
+    dataset = load_dataset(options.data.data, options.data.over(dataset_options(source), all));
   }
   const RenderViews views = render_views(options, source, model, dataset);
   const std::vector<Camera>& cameras = views.cameras;

@@ -47,11 +47,14 @@ struct Options {
   DeviceFlags device;
 };
 
+Split split_of(const Options& options) {
+  return options.data.split ? options.data.chosen_split() : Split::kAll;
+}
+
 /// The views whose cameras the page lists, in its order.
 std::vector<View> views_of(const Options& options, const Dataset& dataset) {
-  const Split split = options.data.split ? options.data.chosen_split() : Split::kAll;
   std::vector<View> views;
-  for (const std::size_t i : dataset.indices(split)) views.push_back(dataset.views[i]);
+  for (const std::size_t i : dataset.indices(split_of(options))) views.push_back(dataset.views[i]);
   return views;
 }
 
@@ -187,8 +190,10 @@ void view_model(const Options& options) {
   const ModelSource source = find_model(options.model);
   const Gaussians gaussians = in_morton_order(read_model(source.file));
   Dataset dataset;
-  if (!options.data.data.empty())
-    dataset = load_dataset(options.data.data, options.data.settings.over(dataset_options(source)));
+  if (!options.data.data.empty()) {
+    const bool all = split_of(options) == Split::kAll;
+    dataset = load_dataset(options.data.data, options.data.over(dataset_options(source), all));
+  }
   const TraceOptions own = trace_options(source);
   const TraceOptions trace = options.trace.over(own);
   const std::vector<View> views = views_of(options, dataset);

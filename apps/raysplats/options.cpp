@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <system_error>
+#include <utility>
 
 #include "logging.hpp"
 #include "scene/option_flags.hpp"
@@ -154,6 +155,11 @@ Split DataFlags::chosen_split() const {
   const std::string name = split.value_or("test");
   if (name == "train") return Split::kTrain;
   return name == "all" ? Split::kAll : Split::kTest;
+}
+
+DatasetOptions DataFlags::over(DatasetOptions run, bool all) const {
+  if (all) run.test_list.reset();
+  return settings.over(std::move(run));
 }
 
 void DataFlags::check_used(bool orbit) const {

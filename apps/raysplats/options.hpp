@@ -65,6 +65,10 @@ struct DataFlags {
   DataSettings settings;
 
   Split chosen_split() const;
+  /// How to read the data set, of which `run` says what the command line does not. Where `all`
+  /// views are taken, the run's list of test photos chooses none, and other data need not have
+  /// them.
+  DatasetOptions over(DatasetOptions run, bool all) const;
   /// Throws UsageError for options that choose among views where no data set gives any, or where
   /// an orbit goes around all of them.
   void check_used(bool orbit) const;

@@ -160,6 +160,16 @@ TEST_CASE("a run holds out what its list names, whatever becomes of the file") {
   check_refused(training(run, 8) + Words{"--resume", run, "--test-every", "8"}, 2,
                 "other photos held out than 'test-every' says now");
 
+  write_file(folder / "every.toml", "test-every = 8\n");
+  check_refused(training(run, 8) + Words{"--resume", run, "--config", folder / "every.toml"}, 2,
+                "other photos held out than 'test-every' says now");
+
+  const std::string strange = folder / "strange";  // without the photos that the list names
+  succeed({"generate", strange, "--train-views", "2", "--test-views", "1", "--size", "24", "-q"});
+  const Words render{"render", run, "--data", strange, "-o", folder / "frames", "-q"};
+  check_refused(render, 2, "in the list of test photos mean no photo of");
+  succeed(render + Words{"--split", "all"});
+
   const std::string other = folder / "other";
   for (const Words& command : {training(other, 2), Words{"info", data()},
                                Words{"eval", run, "--data", data(), "-o", other}})
