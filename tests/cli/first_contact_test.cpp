@@ -158,11 +158,11 @@ TEST_CASE("a run holds out what its list names, whatever becomes of the file") {
   write_file(list, "r_2.png\ntest/r_1\n");
   succeed(training(run, 6) + Words{"--resume", run} + listed);
   check_refused(training(run, 8) + Words{"--resume", run, "--test-every", "8"}, 2,
-                "other photos held out than 'test-every' says now");
+                "cameras and 'test-list' or 'test-every' of the run");
 
   write_file(folder / "every.toml", "test-every = 8\n");
   check_refused(training(run, 8) + Words{"--resume", run, "--config", folder / "every.toml"}, 2,
-                "other photos held out than 'test-every' says now");
+                "cameras and 'test-list' or 'test-every' of the run");
 
   const std::string strange = folder / "strange";  // without the photos that the list names
   succeed({"generate", strange, "--train-views", "2", "--test-views", "1", "--size", "24", "-q"});
