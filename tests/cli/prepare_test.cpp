@@ -495,7 +495,8 @@ TEST_CASE("prepare says in one sentence what is missing") {
   CHECK(entries(stage.path("photos")) == 3);
 }
 
-// RAYSPLATS_TEST_DATA as in tests/unit/io/real_data_test.cpp. COLMAP takes minutes for the photos.
+// RAYSPLATS_TEST_DATA as in tests/unit/io/dataset/real_data_test.cpp. COLMAP takes minutes for the
+// photos.
 TEST_CASE("the real COLMAP finds the poses of a capture, where both are there") {
   const char* data = std::getenv("RAYSPLATS_TEST_DATA");
   SKIP_TEST_UNLESS(data != nullptr && std::system("command -v colmap > /dev/null") == 0,
