@@ -13,8 +13,8 @@
 #include "embree_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "scene/morton_order.hpp"
-#include "scene/pixel_count.hpp"
 #include "side_by_side.hpp"
 
 namespace raysplats::peer {

@@ -11,8 +11,8 @@
 
 #include "raysplats/io.hpp"
 #include "run/model_source.hpp"
-#include "scene/model_summary.hpp"
-#include "scene/trace_option_table.hpp"
+#include "scene/gaussians/model_summary.hpp"
+#include "scene/options/trace_option_table.hpp"
 
 namespace raysplats::cli {
 namespace {

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "logging.hpp"
-#include "scene/option_flags.hpp"
+#include "scene/options/option_flags.hpp"
 #include "util/number_text.hpp"
 #include "util/progress.hpp"
 #include "validators.hpp"

@@ -15,8 +15,8 @@
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trace_options.hpp"
-#include "scene/render_option_table.hpp"
-#include "scene/trace_option_table.hpp"
+#include "scene/options/render_option_table.hpp"
+#include "scene/options/trace_option_table.hpp"
 
 namespace raysplats::cli {
 

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "raysplats/error.hpp"
-#include "scene/camera_check.hpp"
+#include "scene/camera/camera_check.hpp"
 #include "util/number_text.hpp"
 #include "validators.hpp"
 

@@ -6,7 +6,7 @@
 
 #include "options.hpp"
 #include "render/frame_writer.hpp"
-#include "scene/render_option_table.hpp"
+#include "scene/options/render_option_table.hpp"
 
 namespace raysplats::cli {
 

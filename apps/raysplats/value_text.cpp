@@ -12,7 +12,7 @@
 #include <system_error>
 
 #include "raysplats/error.hpp"
-#include "scene/camera_check.hpp"
+#include "scene/camera/camera_check.hpp"
 #include "util/number_text.hpp"
 
 namespace raysplats::cli {

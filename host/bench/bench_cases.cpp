@@ -11,7 +11,7 @@
 
 #include "device/tuning.hpp"
 #include "raysplats/error.hpp"
-#include "scene/trace_option_table.hpp"
+#include "scene/options/trace_option_table.hpp"
 #include "synth/bench_scenes.hpp"
 #include "trace/memory_shares.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "bench/scene_state.hpp"
 #include "parallel/work.h"
-#include "scene/trace_option_table.hpp"
+#include "scene/options/trace_option_table.hpp"
 #include "trace/work.h"
 #include "util/rng.hpp"
 

@@ -8,7 +8,7 @@
 
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "synth/bench_scenes.hpp"
 #include "trace/packet_layout.hpp"
 

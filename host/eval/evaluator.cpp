@@ -19,8 +19,8 @@
 #include "raysplats/io.hpp"
 #include "render/frame_writer.hpp"
 #include "scene/even_choice.hpp"
-#include "scene/image_check.hpp"
-#include "scene/sharpness.hpp"
+#include "scene/image/image_check.hpp"
+#include "scene/image/sharpness.hpp"
 #include "trace/sky.hpp"
 #include "util/atomic_file.hpp"
 

@@ -5,7 +5,7 @@
 
 #include "io/image/image_codec.hpp"
 #include "raysplats/error.hpp"
-#include "scene/image_check.hpp"
+#include "scene/image/image_check.hpp"
 #include "util/file_kind.hpp"
 
 namespace raysplats {

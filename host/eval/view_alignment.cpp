@@ -8,7 +8,7 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 
 namespace raysplats {
 namespace {

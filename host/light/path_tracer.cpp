@@ -13,13 +13,13 @@
 
 #include "light/path_tracer_impl.hpp"
 #include "raysplats/error.hpp"
-#include "scene/camera_check.hpp"
-#include "scene/gaussian_check.hpp"
-#include "scene/pixel_count.hpp"
-#include "scene/pixel_places.hpp"
-#include "scene/render_option_table.hpp"
-#include "scene/row_share.hpp"
-#include "scene/shadow_bias.hpp"
+#include "scene/camera/camera_check.hpp"
+#include "scene/gaussians/gaussian_check.hpp"
+#include "scene/image/pixel_count.hpp"
+#include "scene/image/pixel_places.hpp"
+#include "scene/image/row_share.hpp"
+#include "scene/mesh/shadow_bias.hpp"
+#include "scene/options/render_option_table.hpp"
 
 namespace raysplats {
 namespace {

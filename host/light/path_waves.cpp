@@ -6,7 +6,7 @@
 
 #include "device/kernel.hpp"
 #include "light/path_tracer_impl.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 
 namespace raysplats {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "light/environment.hpp"
 #include "raysplats/error.hpp"
-#include "scene/mesh.hpp"
+#include "scene/mesh/mesh.hpp"
 #include "shared/light_layout.h"
 
 namespace raysplats {

@@ -18,7 +18,7 @@ class SurfaceStore {
   /// Throws UsageError for materials, lights and textures out of range, DataError for meshes.
   SurfaceStore(Context& context, const Scene& scene);
 
-  /// Throws DataError as validate() of scene/mesh.hpp; then nothing has changed.
+  /// Throws DataError as validate() of scene/mesh/mesh.hpp; then nothing has changed.
   void set_meshes(const std::vector<Mesh>& meshes);
 
   TriangleTracer& triangles() { return triangles_; }

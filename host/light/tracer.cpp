@@ -14,7 +14,7 @@
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/opencl.hpp"
-#include "scene/planes.hpp"
+#include "scene/image/planes.hpp"
 #include "trace/memory_shares.hpp"
 #include "trace/model_impl.hpp"
 #include "trace/ray_backward.hpp"

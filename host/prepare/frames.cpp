@@ -14,7 +14,7 @@
 
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
-#include "scene/sharpness.hpp"
+#include "scene/image/sharpness.hpp"
 #include "util/file_kind.hpp"
 #include "util/number_text.hpp"
 #include "util/path_text.hpp"

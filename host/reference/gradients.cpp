@@ -8,7 +8,7 @@
 
 #include "raysplats/error.hpp"
 #include "reference/sky.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 
 namespace raysplats::reference {
 namespace {

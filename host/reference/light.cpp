@@ -13,7 +13,7 @@
 #include "raysplats/error.hpp"
 #include "reference/light_shading.hpp"
 #include "reference/optics.hpp"
-#include "scene/shadow_bias.hpp"
+#include "scene/mesh/shadow_bias.hpp"
 
 namespace raysplats::reference {
 namespace {

@@ -8,7 +8,7 @@
 #include "reference/environment.hpp"
 #include "reference/tracer.hpp"
 #include "reference/triangles.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 
 namespace raysplats::reference {
 

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "raysplats/error.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 
 namespace raysplats::reference {
 namespace {

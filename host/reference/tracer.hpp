@@ -7,7 +7,7 @@
 
 #include "raysplats/camera.hpp"
 #include "reference/gaussian.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 
 namespace raysplats::reference {
 

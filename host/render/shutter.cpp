@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "raysplats/error.hpp"
-#include "scene/camera_path.hpp"
+#include "scene/camera/camera_path.hpp"
 
 namespace raysplats {
 

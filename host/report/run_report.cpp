@@ -23,7 +23,7 @@
 #include "report/run_files.hpp"
 #include "report/run_warnings.hpp"
 #include "run/train_config.hpp"
-#include "scene/activation.hpp"
+#include "scene/gaussians/activation.hpp"
 #include "util/atomic_file.hpp"
 #include "util/number_text.hpp"
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "io/byte_reader.hpp"
-#include "scene/photo_lens.hpp"
+#include "scene/camera/photo_lens.hpp"
 
 namespace raysplats {
 namespace {

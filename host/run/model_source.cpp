@@ -18,7 +18,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "run/train_config.hpp"
-#include "scene/gaussian_transform.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
 #include "util/file_kind.hpp"
 #include "util/shell_word.hpp"
 

@@ -17,8 +17,8 @@
 #include "raysplats/error.hpp"
 #include "run/checkpoint.hpp"
 #include "run/train_option_table.hpp"
-#include "scene/option_flags.hpp"
-#include "scene/trace_option_table.hpp"
+#include "scene/options/option_flags.hpp"
+#include "scene/options/trace_option_table.hpp"
 #include "util/file_kind.hpp"
 #include "util/nearest_name.hpp"
 

@@ -13,7 +13,7 @@
 
 #include "io/dataset/data_option_table.hpp"
 #include "raysplats/error.hpp"
-#include "scene/trace_option_table.hpp"
+#include "scene/options/trace_option_table.hpp"
 #include "util/number_text.hpp"
 
 namespace raysplats {

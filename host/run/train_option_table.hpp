@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "raysplats/train_options.hpp"
-#include "scene/option_table.hpp"
+#include "scene/options/option_table.hpp"
 
 namespace raysplats {
 

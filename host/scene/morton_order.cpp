@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "scene/gaussian_selection.hpp"
+#include "scene/gaussians/gaussian_selection.hpp"
 
 namespace raysplats {
 namespace {

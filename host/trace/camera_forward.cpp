@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "device/fault_injection.hpp"
-#include "scene/trace_option_table.hpp"
+#include "scene/options/trace_option_table.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/camera_tracer_impl.hpp"
 

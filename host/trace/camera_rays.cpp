@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 
 #include "raysplats/error.hpp"
-#include "scene/camera_model.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/camera/camera_model.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "shared/layout.h"
 
 namespace raysplats {

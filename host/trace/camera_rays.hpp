@@ -38,9 +38,9 @@ ColorDirection color_direction(const Camera& camera);
 /// World direction along which the depths of a picture count; zero where they do along every ray.
 std::array<float, 4> depth_axis(const Camera& camera);
 
-/// Makes rays of pixels on the device, for every camera model (scene/camera_model.hpp has the same
-/// in double precision). Random numbers are functions of (seed, pixel, sample): dimensions 0 and 1
-/// place the ray on the lens (cl/shared/random.h).
+/// Makes rays of pixels on the device, for every camera model (scene/camera/camera_model.hpp has
+/// the same in double precision). Random numbers are functions of (seed, pixel, sample): dimensions
+/// 0 and 1 place the ray on the lens (cl/shared/random.h).
 class CameraRays {
  public:
   explicit CameraRays(Context& context) : context_(context) {}

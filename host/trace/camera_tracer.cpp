@@ -8,9 +8,9 @@
 
 #include "bvh/gaussian_bounds.hpp"
 #include "raysplats/error.hpp"
-#include "scene/camera_check.hpp"
-#include "scene/planes.hpp"
-#include "scene/trace_option_table.hpp"
+#include "scene/camera/camera_check.hpp"
+#include "scene/image/planes.hpp"
+#include "scene/options/trace_option_table.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/camera_tracer_impl.hpp"
 

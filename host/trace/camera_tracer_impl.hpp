@@ -10,8 +10,8 @@
 #include <functional>
 #include <vector>
 
-#include "scene/pixel_count.hpp"
-#include "scene/row_share.hpp"
+#include "scene/image/pixel_count.hpp"
+#include "scene/image/row_share.hpp"
 #include "trace/camera_tracer.hpp"
 #include "trace/candidate_lists.hpp"
 #include "trace/gaussian_kernel.hpp"

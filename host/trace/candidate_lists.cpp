@@ -11,7 +11,7 @@
 #include <numbers>
 
 #include "raysplats/error.hpp"
-#include "scene/camera_check.hpp"
+#include "scene/camera/camera_check.hpp"
 
 namespace raysplats {
 namespace {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "raysplats/model.hpp"
 
-#include "scene/gaussian_check.hpp"
+#include "scene/gaussians/gaussian_check.hpp"
 #include "trace/model_impl.hpp"
 
 namespace raysplats {

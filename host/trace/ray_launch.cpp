@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "scene/trace_option_table.hpp"
+#include "scene/options/trace_option_table.hpp"
 #include "trace/ray_tracer.hpp"
 
 namespace raysplats {

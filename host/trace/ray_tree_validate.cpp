@@ -10,7 +10,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 
-#include "scene/activation.hpp"
+#include "scene/gaussians/activation.hpp"
 #include "shared/tree_layout.h"
 
 namespace raysplats {

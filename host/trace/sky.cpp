@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "trace/camera_rays.hpp"
 
 namespace raysplats {

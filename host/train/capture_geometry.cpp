@@ -10,10 +10,10 @@
 #include <optional>
 #include <utility>
 
+#include "scene/camera/orbit.hpp"
+#include "scene/camera/view_axes.hpp"
 #include "scene/even_choice.hpp"
-#include "scene/orbit.hpp"
 #include "scene/statistics.hpp"
-#include "scene/view_axes.hpp"
 
 namespace raysplats {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "scene/statistics.hpp"
 #include "train/schedule.hpp"
 

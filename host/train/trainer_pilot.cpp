@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "train/run_time.hpp"
 #include "train/schedule.hpp"
 #include "train/trainer_impl.hpp"

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "run/train_config.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
 

@@ -15,7 +15,7 @@
 
 #include "io/scene/scene_file.hpp"
 #include "raysplats/error.hpp"
-#include "scene/mesh.hpp"
+#include "scene/mesh/mesh.hpp"
 #include "util/json_text.hpp"
 
 namespace raysplats::view {

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "raysplats/error.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "view/sampling.hpp"
 
 namespace raysplats::view {

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "raysplats/error.hpp"
-#include "scene/orbit.hpp"
+#include "scene/camera/orbit.hpp"
 #include "view/view_state.hpp"
 
 namespace raysplats::view {

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "render/previews.hpp"
-#include "scene/pixel_places.hpp"
+#include "scene/image/pixel_places.hpp"
 
 namespace raysplats::view {
 namespace {

@@ -13,8 +13,8 @@
 
 #include "io/json_file.hpp"
 #include "raysplats/error.hpp"
-#include "scene/gaussian_transform.hpp"
-#include "scene/trace_option_table.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
+#include "scene/options/trace_option_table.hpp"
 
 namespace raysplats::view {
 namespace {

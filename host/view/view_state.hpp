@@ -7,7 +7,7 @@
 #include <string>
 
 #include "raysplats/camera.hpp"
-#include "scene/orbit.hpp"
+#include "scene/camera/orbit.hpp"
 
 namespace raysplats::view {
 

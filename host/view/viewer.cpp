@@ -12,7 +12,7 @@
 #include <variant>
 
 #include "raysplats/error.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "util/clock.hpp"
 #include "view/picture_file.hpp"
 #include "view/viewer_impl.hpp"

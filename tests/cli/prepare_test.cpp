@@ -22,7 +22,7 @@
 #include "prepare_stage.hpp"
 #include "program.hpp"
 #include "raysplats/io.hpp"
-#include "scene/gaussian_transform.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
 #include "util/file_lock.hpp"
 
 namespace {

@@ -7,7 +7,7 @@
 
 #include "fuzz/fuzz_target.hpp"
 #include "io/mesh/mesh_file.hpp"
-#include "scene/mesh.hpp"
+#include "scene/mesh/mesh.hpp"
 
 namespace raysplats::fuzz {
 namespace {

@@ -16,7 +16,7 @@
 #include "raysplats/rays.hpp"
 #include "raysplats/scene.hpp"
 #include "raysplats/trace_options.hpp"
-#include "scene/photo_lens.hpp"
+#include "scene/camera/photo_lens.hpp"
 
 namespace raysplats::python {
 

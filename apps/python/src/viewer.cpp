@@ -14,7 +14,7 @@
 #include "raysplats/camera.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/trace_options.hpp"
-#include "scene/camera_check.hpp"
+#include "scene/camera/camera_check.hpp"
 #include "signals.hpp"
 #include "tuples.hpp"
 #include "view/model_viewer.hpp"

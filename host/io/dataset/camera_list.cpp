@@ -22,8 +22,8 @@
 #include "io/text_reader.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
-#include "scene/camera_check.hpp"
-#include "scene/photo_lens.hpp"
+#include "scene/camera/camera_check.hpp"
+#include "scene/camera/photo_lens.hpp"
 
 namespace raysplats::io {
 namespace {

@@ -18,8 +18,8 @@
 
 #include "io/byte_reader.hpp"
 #include "io/text_reader.hpp"
-#include "scene/camera_model.hpp"
-#include "scene/photo_lens.hpp"
+#include "scene/camera/camera_model.hpp"
+#include "scene/camera/photo_lens.hpp"
 
 namespace raysplats::io {
 namespace {

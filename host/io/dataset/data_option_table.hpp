@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "raysplats/dataset.hpp"
-#include "scene/given_options.hpp"
-#include "scene/option_table.hpp"
+#include "scene/options/given_options.hpp"
+#include "scene/options/option_table.hpp"
 
 namespace raysplats {
 

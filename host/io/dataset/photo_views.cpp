@@ -12,9 +12,9 @@
 
 #include "io/photo/photo_orientation.hpp"
 #include "raysplats/error.hpp"
-#include "scene/camera_check.hpp"
-#include "scene/camera_model.hpp"
-#include "scene/photo_lens.hpp"
+#include "scene/camera/camera_check.hpp"
+#include "scene/camera/camera_model.hpp"
+#include "scene/camera/photo_lens.hpp"
 
 namespace raysplats::io {
 

@@ -16,7 +16,7 @@
 #include "io/json_file.hpp"
 #include "io/text_reader.hpp"
 #include "raysplats/error.hpp"
-#include "scene/camera_check.hpp"
+#include "scene/camera/camera_check.hpp"
 #include "util/path_text.hpp"
 
 namespace raysplats::io {

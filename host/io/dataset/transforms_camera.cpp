@@ -12,8 +12,8 @@
 
 #include "io/dataset/camera_model_names.hpp"
 #include "raysplats/error.hpp"
-#include "scene/camera_model.hpp"
-#include "scene/photo_lens.hpp"
+#include "scene/camera/camera_model.hpp"
+#include "scene/camera/photo_lens.hpp"
 
 namespace raysplats::io {
 namespace {

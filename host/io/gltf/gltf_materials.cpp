@@ -10,7 +10,7 @@
 
 #include "io/image/image_file.hpp"
 #include "raysplats/error.hpp"
-#include "scene/mesh_edges.hpp"
+#include "scene/mesh/mesh_edges.hpp"
 #include "util/srgb.hpp"
 
 namespace raysplats::io {

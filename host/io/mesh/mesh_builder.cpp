@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "raysplats/error.hpp"
-#include "scene/polygon.hpp"
+#include "scene/mesh/polygon.hpp"
 
 namespace raysplats::io {
 namespace {

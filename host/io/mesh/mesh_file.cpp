@@ -7,7 +7,7 @@
 
 #include "io/byte_reader.hpp"
 #include "raysplats/error.hpp"
-#include "scene/mesh.hpp"
+#include "scene/mesh/mesh.hpp"
 #include "util/path_text.hpp"
 
 namespace raysplats::io {

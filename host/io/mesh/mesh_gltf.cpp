@@ -18,7 +18,7 @@
 #include "io/mesh/mesh_builder.hpp"
 #include "io/mesh/mesh_file.hpp"
 #include "raysplats/error.hpp"
-#include "scene/mesh.hpp"
+#include "scene/mesh/mesh.hpp"
 
 namespace raysplats::io {
 namespace {

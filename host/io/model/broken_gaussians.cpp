@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
-#include "scene/gaussian_selection.hpp"
+#include "scene/gaussians/gaussian_selection.hpp"
 #include "util/shell_word.hpp"
 
 namespace raysplats::io {

@@ -19,8 +19,8 @@
 #include "io/model/ply_options.hpp"
 #include "io/model/spz_axes.hpp"
 #include "raysplats/error.hpp"
-#include "scene/gaussian_transform.hpp"
-#include "scene/model_changes.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
+#include "scene/gaussians/model_changes.hpp"
 #include "util/atomic_file.hpp"
 #include "util/stop_if_interrupted.hpp"
 

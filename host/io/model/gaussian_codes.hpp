@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "scene/activation.hpp"
+#include "scene/gaussians/activation.hpp"
 #include "shared/sh.h"
 
 /// How the numbers of a Gaussian are coded in files other than PLY.

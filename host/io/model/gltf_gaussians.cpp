@@ -17,7 +17,7 @@
 #include "io/model/gltf_gaussians.hpp"
 #include "io/model/model_formats.hpp"
 #include "raysplats/error.hpp"
-#include "scene/gaussian_transform.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
 
 namespace raysplats::io {
 namespace {

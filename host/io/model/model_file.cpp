@@ -17,7 +17,7 @@
 #include "io/model/sog_file.hpp"
 #include "io/model/spz_codes.hpp"
 #include "raysplats/error.hpp"
-#include "scene/gaussian_check.hpp"
+#include "scene/gaussians/gaussian_check.hpp"
 #include "util/path_text.hpp"
 
 namespace raysplats {

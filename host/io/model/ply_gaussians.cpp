@@ -20,7 +20,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/gaussians.hpp"
 #include "raysplats/io.hpp"
-#include "scene/gaussian_check.hpp"
+#include "scene/gaussians/gaussian_check.hpp"
 #include "util/atomic_file.hpp"
 
 namespace raysplats {

@@ -16,7 +16,7 @@
 #include "io/text_reader.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
-#include "scene/trace_option_table.hpp"
+#include "scene/options/trace_option_table.hpp"
 
 namespace raysplats {
 namespace {

@@ -18,8 +18,8 @@
 #include "io/model/sog_file.hpp"
 #include "io/zip_archive.hpp"
 #include "raysplats/error.hpp"
+#include "scene/gaussians/quantization.hpp"
 #include "scene/morton_order.hpp"
-#include "scene/quantization.hpp"
 #include "util/atomic_file.hpp"
 #include "util/stop_if_interrupted.hpp"
 

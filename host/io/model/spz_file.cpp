@@ -14,7 +14,7 @@
 #include "io/model/spz_axes.hpp"
 #include "io/model/spz_codes.hpp"
 #include "raysplats/error.hpp"
-#include "scene/gaussian_transform.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
 #include "util/atomic_file.hpp"
 
 namespace raysplats::io {

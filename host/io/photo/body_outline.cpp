@@ -11,8 +11,8 @@
 #include <limits>
 #include <vector>
 
-#include "scene/camera_model.hpp"
-#include "scene/view_axes.hpp"
+#include "scene/camera/camera_model.hpp"
+#include "scene/camera/view_axes.hpp"
 
 namespace raysplats::io {
 namespace {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "io/photo/body_outline.hpp"
+#include "scene/camera/photo_lens.hpp"
 #include "scene/even_choice.hpp"
-#include "scene/photo_lens.hpp"
 
 namespace raysplats::io {
 namespace {

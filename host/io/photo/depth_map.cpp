@@ -18,9 +18,9 @@
 #include "io/image/image_file.hpp"
 #include "io/npy_file.hpp"
 #include "raysplats/error.hpp"
-#include "scene/camera_model.hpp"
-#include "scene/photo_lens.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/camera/camera_model.hpp"
+#include "scene/camera/photo_lens.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "util/path_text.hpp"
 
 namespace raysplats::io {

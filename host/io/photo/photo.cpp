@@ -4,8 +4,8 @@
 #include <bit>
 
 #include "io/photo/view_rows.hpp"
-#include "scene/pixel_count.hpp"
-#include "scene/sharpness.hpp"
+#include "scene/image/pixel_count.hpp"
+#include "scene/image/sharpness.hpp"
 
 namespace raysplats::io {
 namespace {

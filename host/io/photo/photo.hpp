@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "raysplats/dataset.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 
 namespace raysplats::io {
 

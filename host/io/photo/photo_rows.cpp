@@ -12,8 +12,8 @@
 #include <type_traits>
 #include <utility>
 
-#include "scene/camera_model.hpp"
-#include "scene/photo_lens.hpp"
+#include "scene/camera/camera_model.hpp"
+#include "scene/camera/photo_lens.hpp"
 #include "util/srgb.hpp"
 
 namespace raysplats::io {

@@ -4,7 +4,7 @@
 
 #include "io/photo/view_rows.hpp"
 #include "raysplats/dataset.hpp"
-#include "scene/image_check.hpp"
+#include "scene/image/image_check.hpp"
 
 namespace raysplats {
 

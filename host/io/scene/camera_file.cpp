@@ -16,9 +16,9 @@
 #include "io/image/image_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
-#include "scene/camera_check.hpp"
-#include "scene/camera_model.hpp"
-#include "scene/photo_lens.hpp"
+#include "scene/camera/camera_check.hpp"
+#include "scene/camera/camera_model.hpp"
+#include "scene/camera/photo_lens.hpp"
 #include "util/atomic_file.hpp"
 #include "util/json_text.hpp"
 

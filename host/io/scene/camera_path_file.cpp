@@ -14,9 +14,9 @@
 #include "io/scene/scene_camera.hpp"
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
-#include "scene/camera_check.hpp"
-#include "scene/camera_path.hpp"
-#include "scene/gaussian_transform.hpp"
+#include "scene/camera/camera_check.hpp"
+#include "scene/camera/camera_path.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
 
 namespace raysplats {
 namespace {

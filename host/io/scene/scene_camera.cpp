@@ -15,8 +15,8 @@
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
-#include "scene/camera_check.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_check.hpp"
+#include "scene/camera/camera_model.hpp"
 
 namespace raysplats {
 namespace {

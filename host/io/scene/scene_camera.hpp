@@ -12,7 +12,7 @@
 #include "io/dataset/data_option_table.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/dataset.hpp"
-#include "scene/orbit.hpp"
+#include "scene/camera/orbit.hpp"
 
 namespace raysplats {
 

@@ -11,7 +11,7 @@
 
 #include "io/toml_table.hpp"
 #include "raysplats/error.hpp"
-#include "scene/render_option_table.hpp"
+#include "scene/options/render_option_table.hpp"
 #include "util/nearest_name.hpp"
 
 namespace raysplats {

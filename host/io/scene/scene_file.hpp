@@ -14,7 +14,7 @@
 #include "raysplats/dataset.hpp"
 #include "raysplats/scene.hpp"
 #include "raysplats/trace_options.hpp"
-#include "scene/trace_option_table.hpp"
+#include "scene/options/trace_option_table.hpp"
 
 namespace raysplats {
 

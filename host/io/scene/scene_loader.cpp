@@ -20,9 +20,9 @@
 #include "io/mesh/texture_file.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
-#include "scene/gaussian_transform.hpp"
-#include "scene/mesh.hpp"
-#include "scene/mesh_edges.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
+#include "scene/mesh/mesh.hpp"
+#include "scene/mesh/mesh_edges.hpp"
 #include "scene/morton_order.hpp"
 #include "util/nearest_name.hpp"
 

@@ -6,7 +6,7 @@
 #include "io/scene/scene_file.hpp"
 #include "raysplats/camera.hpp"
 #include "raysplats/scene.hpp"
-#include "scene/orbit.hpp"
+#include "scene/camera/orbit.hpp"
 
 namespace raysplats {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "raysplats/error.hpp"
-#include "scene/activation.hpp"
+#include "scene/gaussians/activation.hpp"
 #include "train/density/mcmc.hpp"
 #include "train/schedule.hpp"
 #include "util/rng.hpp"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "scene/activation.hpp"
+#include "scene/gaussians/activation.hpp"
 #include "scene/morton_order.hpp"
 
 namespace raysplats {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene/activation.hpp"
+#include "scene/gaussians/activation.hpp"
 #include "scene/morton_order.hpp"
 #include "util/rng.hpp"
 

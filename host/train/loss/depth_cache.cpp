@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "raysplats/error.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "util/parallel.hpp"
 
 namespace raysplats {

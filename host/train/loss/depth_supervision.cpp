@@ -7,7 +7,7 @@
 #include <cstdint>
 
 #include "raysplats/error.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "util/mebibytes.hpp"
 
 namespace raysplats {

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "raysplats/error.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 
 namespace raysplats {
 namespace {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <utility>
 
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 
 namespace raysplats {
 namespace {

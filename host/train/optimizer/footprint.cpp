@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
-#include "scene/activation.hpp"
+#include "scene/gaussians/activation.hpp"
 
 namespace raysplats {
 namespace {

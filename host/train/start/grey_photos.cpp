@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "scene/camera/view_axes.hpp"
 #include "scene/statistics.hpp"
-#include "scene/view_axes.hpp"
 #include "train/capture_geometry.hpp"
 
 namespace raysplats {

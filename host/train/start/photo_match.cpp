@@ -9,7 +9,7 @@
 #include <glm/vec3.hpp>
 #include <iterator>
 
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "scene/statistics.hpp"
 
 namespace raysplats {

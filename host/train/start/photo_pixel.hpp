@@ -6,7 +6,7 @@
 #include <glm/vec4.hpp>
 #include <span>
 
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "train/start/photo_set.hpp"
 #include "util/rng.hpp"
 

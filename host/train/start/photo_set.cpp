@@ -10,7 +10,7 @@
 #include <numeric>
 
 #include "io/photo/view_loader.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "scene/statistics.hpp"
 #include "util/clock.hpp"
 #include "util/progress.hpp"

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "scene/statistics.hpp"
 #include "train/start/photo_match.hpp"
 #include "train/start/photo_pixel.hpp"

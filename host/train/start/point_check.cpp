@@ -11,7 +11,7 @@
 #include <limits>
 #include <vector>
 
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "scene/even_choice.hpp"
 #include "train/start/point_cloud.hpp"
 #include "util/parallel.hpp"

@@ -10,7 +10,7 @@
 #include <optional>
 #include <utility>
 
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "scene/statistics.hpp"
 #include "train/capture_geometry.hpp"
 #include "train/start/depth_range.hpp"

@@ -14,7 +14,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/evaluation.hpp"
 #include "raysplats/io.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "unit/temporary_directory.hpp"
 
 namespace raysplats {

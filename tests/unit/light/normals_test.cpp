@@ -6,7 +6,7 @@
 
 #include "raysplats/error.hpp"
 #include "raysplats/tracer.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "unit/light/view_fixture.hpp"
 
 using namespace raysplats;

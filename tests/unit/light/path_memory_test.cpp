@@ -2,7 +2,7 @@
 #include "light/path_memory.hpp"
 
 #include "raysplats/error.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "unit/light/light_fixture.hpp"
 
 using namespace raysplats;

@@ -10,9 +10,9 @@
 #include "raysplats/path_tracer.hpp"
 #include "raysplats/tracer.hpp"
 #include "reference/sky.hpp"
-#include "scene/camera_model.hpp"
-#include "scene/gaussian_transform.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/camera/camera_model.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "unit/light/view_fixture.hpp"
 
 using namespace raysplats;

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "raysplats/error.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "unit/light/ray_result_gradient.hpp"
 #include "unit/text.hpp"
 #include "unit/trace/trace_fixture.hpp"

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "unit/light/view_fixture.hpp"
 
 using namespace raysplats;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;

@@ -13,7 +13,7 @@
 #include "raysplats/io.hpp"
 #include "render/previews.hpp"
 #include "render/shutter.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "trace/camera_tracer.hpp"
 #include "unit/fixture.hpp"
 

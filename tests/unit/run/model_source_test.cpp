@@ -14,7 +14,7 @@
 #include "raysplats/io.hpp"
 #include "run/run_folder.hpp"
 #include "run/train_config.hpp"
-#include "scene/gaussian_transform.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
 #include "unit/log_capture.hpp"
 #include "unit/temporary_directory.hpp"
 

@@ -13,7 +13,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "run/run_folder.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "unit/log_capture.hpp"
 #include "unit/temporary_directory.hpp"
 #include "unit/text.hpp"

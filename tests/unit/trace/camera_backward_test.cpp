@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "skip_test.hpp"
 #include "trace/gradient_sums.hpp"
 #include "unit/trace/trace_fixture.hpp"

@@ -12,9 +12,9 @@
 #include <limits>
 #include <numbers>
 
-#include "scene/camera_model.hpp"
-#include "scene/pixel_count.hpp"
-#include "scene/pixel_places.hpp"
+#include "scene/camera/camera_model.hpp"
+#include "scene/image/pixel_count.hpp"
+#include "scene/image/pixel_places.hpp"
 #include "shared/random.h"
 #include "unit/trace/trace_fixture.hpp"
 

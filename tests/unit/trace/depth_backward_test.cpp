@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "raysplats/error.hpp"
-#include "scene/camera_model.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/camera/camera_model.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "trace/camera_rays.hpp"
 #include "trace/lens_tiles.hpp"
 #include "trace/ray_backward.hpp"

@@ -16,7 +16,7 @@
 #include "reference/gradients.hpp"
 #include "reference/scenes.hpp"
 #include "reference/tracer.hpp"
-#include "scene/trace_option_table.hpp"
+#include "scene/options/trace_option_table.hpp"
 #include "trace/camera_tracer.hpp"
 #include "unit/fixture.hpp"
 #include "util/rng.hpp"

@@ -10,7 +10,7 @@
 
 #include "light/view_tracer.hpp"
 #include "raysplats/error.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "trace/camera_tracer.hpp"
 #include "train/density/density_control.hpp"
 #include "train/optimizer/adam.hpp"

@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "train/start/photo_set.hpp"
 
 namespace raysplats::test {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "unit/text.hpp"
 
 using namespace raysplats;

@@ -9,7 +9,7 @@
 #include "io/photo/view_loader.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/io.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "skip_test.hpp"
 #include "unit/io/scratch.hpp"
 

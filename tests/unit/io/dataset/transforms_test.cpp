@@ -9,7 +9,7 @@
 #include <string>
 
 #include "raysplats/dataset.hpp"
-#include "scene/camera_check.hpp"
+#include "scene/camera/camera_check.hpp"
 #include "unit/io/transforms_fixture.hpp"
 #include "unit/log_capture.hpp"
 #include "util/rng.hpp"

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "scene/mesh.hpp"
+#include "scene/mesh/mesh.hpp"
 #include "skip_test.hpp"
 #include "unit/io/scratch.hpp"
 

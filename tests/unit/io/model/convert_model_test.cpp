@@ -8,7 +8,7 @@
 
 #include "io/model/gaussian_codes.hpp"
 #include "io/model/model_file.hpp"
-#include "scene/gaussian_transform.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
 #include "scene/morton_order.hpp"
 #include "unit/io/model_bytes.hpp"
 

@@ -3,7 +3,7 @@
 
 #include "io/mesh/mesh_file.hpp"
 #include "io/model/model_formats.hpp"
-#include "scene/gaussian_transform.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
 #include "unit/io/gltf_fixture.hpp"
 #include "unit/io/model_bytes.hpp"
 

@@ -6,7 +6,7 @@
 
 #include "io/compression.hpp"
 #include "io/model/spz_codes.hpp"
-#include "scene/gaussian_transform.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
 #include "unit/io/model_bytes.hpp"
 #include "unit/log_capture.hpp"
 #include "util/rng.hpp"

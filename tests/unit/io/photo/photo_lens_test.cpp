@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/photo_lens.hpp"
+#include "scene/camera/photo_lens.hpp"
 
 #include <OpenImageIO/imageio.h>
 #include <doctest/doctest.h>
@@ -18,7 +18,7 @@
 #include "io/dataset/transforms_camera.hpp"
 #include "io/photo/depth_map.hpp"
 #include "raysplats/dataset.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "unit/io/data_sets.hpp"
 #include "unit/log_capture.hpp"
 #include "util/rng.hpp"

@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "raysplats/dataset.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;

@@ -13,7 +13,7 @@
 
 #include "io/image/image_file.hpp"
 #include "raysplats/io.hpp"
-#include "scene/sharpness.hpp"
+#include "scene/image/sharpness.hpp"
 #include "unit/io/scratch.hpp"
 #include "util/rng.hpp"
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "raysplats/io.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "unit/io/data_sets.hpp"
 #include "unit/io/scene_folder.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/camera_path.hpp"
+#include "scene/camera/camera_path.hpp"
 
 #include <doctest/doctest.h>
 

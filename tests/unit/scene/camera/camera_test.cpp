@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "raysplats/error.hpp"
-#include "scene/camera_check.hpp"
+#include "scene/camera/camera_check.hpp"
 
 using namespace raysplats;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/gaussian_transform.hpp"
+#include "scene/gaussians/gaussian_transform.hpp"
 
 #include <doctest/doctest.h>
 

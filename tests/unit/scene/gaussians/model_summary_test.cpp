@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/model_summary.hpp"
+#include "scene/gaussians/model_summary.hpp"
 
 #include <doctest/doctest.h>
 

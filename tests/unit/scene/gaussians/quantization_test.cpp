@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/quantization.hpp"
+#include "scene/gaussians/quantization.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/image_check.hpp"
+#include "scene/image/image_check.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/sharpness.hpp"
+#include "scene/image/sharpness.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/mesh.hpp"
+#include "scene/mesh/mesh.hpp"
 
 #include <doctest/doctest.h>
 
@@ -11,7 +11,7 @@
 #include <numbers>
 #include <string>
 
-#include "scene/mesh_edges.hpp"
+#include "scene/mesh/mesh_edges.hpp"
 #include "unit/text.hpp"
 #include "util/rng.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/polygon.hpp"
+#include "scene/mesh/polygon.hpp"
 
 #include <doctest/doctest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/shadow_bias.hpp"
+#include "scene/mesh/shadow_bias.hpp"
 
 #include <doctest/doctest.h>
 

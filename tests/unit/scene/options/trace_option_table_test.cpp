@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/trace_option_table.hpp"
+#include "scene/options/trace_option_table.hpp"
 
 #include <doctest/doctest.h>
 

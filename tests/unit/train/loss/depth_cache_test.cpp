@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "unit/fixture.hpp"
 #include "unit/io/scratch.hpp"
 #include "unit/log_capture.hpp"

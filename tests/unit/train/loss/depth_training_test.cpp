@@ -22,7 +22,7 @@
 #include "raysplats/error.hpp"
 #include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "unit/fixture.hpp"
 #include "unit/log_capture.hpp"
 #include "unit/train/depth_file.hpp"

@@ -13,7 +13,7 @@
 
 #include "raysplats/error.hpp"
 #include "reference/ssim.hpp"
-#include "scene/pixel_count.hpp"
+#include "scene/image/pixel_count.hpp"
 #include "unit/failed_allocation.hpp"
 #include "unit/fixture.hpp"
 #include "util/rng.hpp"

@@ -13,7 +13,7 @@
 #include "raysplats/device.hpp"
 #include "raysplats/trainer.hpp"
 #include "run/checkpoint.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/short_training.hpp"
 #include "util/rng.hpp"

@@ -11,7 +11,7 @@
 #include <memory>
 #include <vector>
 
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "train/start/initialization.hpp"
 #include "train/start/plane_sweep.hpp"
 #include "unit/train/test_photos.hpp"

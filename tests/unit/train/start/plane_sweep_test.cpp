@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "raysplats/error.hpp"
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "unit/train/test_photos.hpp"
 #include "util/interrupt.hpp"
 

@@ -6,7 +6,7 @@
 #include <array>
 #include <vector>
 
-#include "scene/camera_model.hpp"
+#include "scene/camera/camera_model.hpp"
 #include "scene/statistics.hpp"
 #include "train/start/initialization.hpp"
 #include "train/start/photo_start.hpp"
