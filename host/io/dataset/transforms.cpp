@@ -274,6 +274,48 @@ std::optional<std::vector<std::string>> read_names(const Scope& scope, const cha
   return names;
 }
 
+/// Appends lists of frames to those of a file.
+struct FrameReader {
+  const TransformsFrame& common;
+  const glm::dvec3 signs;
+  TransformsFile& file;
+  std::size_t scaled = 0;
+
+  /// `what`: "frame", as errors name one with its place in the list. Returns the paths of the
+  /// photos.
+  std::vector<std::string> read(const json& list, const char* what) {
+    std::vector<std::string> names;
+    for (const json& object : list) {
+      const Scope scope{object, file.path, fmt::format("{} {}", what, names.size())};
+      if (!object.is_object()) scope.fail("it is no JSON object");
+      TransformsFrame frame = common;
+      frame.number = file.frames.size();
+      read_own_intrinsics(scope, frame);
+      scaled += read_pose(scope, signs, frame) ? 1 : 0;
+      frame.file_path = portable_path(scope.text("file_path"));
+      frame.mask_path = portable_path(scope.text("mask_path"));
+      frame.depth_path = portable_path(scope.text("depth_file_path"));
+      names.push_back(frame.file_path);
+      file.frames.push_back(std::move(frame));
+    }
+    return names;
+  }
+};
+
+/// ScanNet++ has frames to test in a list of their own, which counts where no names of frames do.
+void read_test_frames(const Scope& scope, FrameReader& reader) {
+  const auto found = scope.object.find("test_frames");
+  if (found == scope.object.end() || found->is_null()) return;
+  if (!found->is_array()) scope.fail("'test_frames' is no list");
+  TransformsFile& file = reader.file;
+  std::vector<std::string> train;
+  for (const TransformsFrame& frame : file.frames) train.push_back(frame.file_path);
+  std::vector<std::string> test = reader.read(*found, "test frame");
+  if (test.empty() || file.train_filenames || file.val_filenames || file.test_filenames) return;
+  file.train_filenames = std::move(train);
+  file.test_filenames = std::move(test);
+}
+
 }  // namespace
 
 TransformsFrame stated_intrinsics(const json& object,
@@ -302,23 +344,12 @@ TransformsFile parse_transforms(const json& root, const fs::path& path) {
   if (frames == root.end() || !frames->is_array()) {
     throw DataError(fmt::format("{} has no list of frames: it is no camera file", path.string()));
   }
-  const glm::dvec3 signs = axis_signs(scope);
-  std::size_t scaled = 0;
-  for (const json& object : *frames) {
-    const Scope frame_scope{object, path, fmt::format("frame {}", file.frames.size())};
-    if (!object.is_object()) frame_scope.fail("it is no JSON object");
-    TransformsFrame frame = common;
-    frame.number = file.frames.size();
-    read_own_intrinsics(frame_scope, frame);
-    scaled += read_pose(frame_scope, signs, frame) ? 1 : 0;
-    frame.file_path = portable_path(frame_scope.text("file_path"));
-    frame.mask_path = portable_path(frame_scope.text("mask_path"));
-    frame.depth_path = portable_path(frame_scope.text("depth_file_path"));
-    file.frames.push_back(std::move(frame));
-  }
-  if (scaled > 0) {
-    spdlog::info("{} of {} cameras of {} are scaled, which does not change what they see", scaled,
-                 file.frames.size(), path.string());
+  FrameReader reader{common, axis_signs(scope), file};
+  reader.read(*frames, "frame");
+  read_test_frames(scope, reader);
+  if (reader.scaled > 0) {
+    spdlog::info("{} of {} cameras of {} are scaled, which does not change what they see",
+                 reader.scaled, file.frames.size(), path.string());
   }
   return file;
 }

@@ -35,13 +35,14 @@ struct TransformsFrame {
 /// A transforms.json of Blender / NeRF-synthetic, instant-ngp or nerfstudio.
 struct TransformsFile {
   std::filesystem::path path;
-  std::vector<TransformsFrame> frames;
-  std::string ply_file_path;  ///< sparse points, usually empty
+  std::vector<TransformsFrame> frames;  ///< those to test (test_frames) behind the others
+  std::string ply_file_path;            ///< sparse points, usually empty
   std::optional<std::vector<std::string>> train_filenames, val_filenames, test_filenames;
 };
 
 /// Numbers may be texts ("500"), matrices of 3 x 4, 4 x 4 or as many numbers in one list. Cameras
 /// of NeuS2 (from_na) and Mitsuba (normal_mts_args) have axes of their own, which an info says.
+/// Frames of test_frames (ScanNet++) count as those of test_filenames where the file has no lists.
 /// Throws DataError for malformed JSON, camera models other than those of model_names()
 /// (instant-ngp: is_fisheye), k5 and k6 that are not 0, and matrices that are not finite or, but
 /// for the lengths of their axes, no rigid motion to 1e-3; smaller deviations are orthonormalised.

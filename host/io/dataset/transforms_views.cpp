@@ -34,6 +34,21 @@ struct FramePhoto {
   bool reformatted = false;  ///< with another extension
 };
 
+/// ScanNet++ has its files in a folder "nerfstudio" and what they name in others beside it: the
+/// folder of one kind.
+struct ScanNetFolder {
+  const char* of_lens;      ///< of transforms.json
+  const char* undistorted;  ///< of transforms_undistorted.json
+
+  fs::path of(const TransformsFile& file) const {
+    const fs::path folder = fs::absolute(file.path).lexically_normal().parent_path();
+    if (folder.filename() != "nerfstudio") return {};
+    return folder.parent_path() / (file.path.stem() == "transforms" ? of_lens : undistorted);
+  }
+};
+constexpr ScanNetFolder kScanNetPhotos{"resized_images", "resized_undistorted_images"};
+constexpr ScanNetFolder kScanNetMasks{"resized_anon_masks", "resized_undistorted_masks"};
+
 std::optional<FramePhoto> frame_photo(const TransformsFile& file,
                                       const TransformsFrame& frame,
                                       RespeltFinder& respelt) {
@@ -43,6 +58,9 @@ std::optional<FramePhoto> frame_photo(const TransformsFile& file,
   }
   if (auto photo = find_image(folder, frame.file_path)) return FramePhoto{*photo};
   if (auto photo = respelt.find(folder, frame.file_path)) return FramePhoto{*photo, false, true};
+  if (const fs::path beside = kScanNetPhotos.of(file); !beside.empty()) {
+    if (auto photo = find_image(beside, frame.file_path)) return FramePhoto{*photo};
+  }
   if (auto photo = find_moved(folder, frame.file_path, 1)) return FramePhoto{*photo, true};
   if (auto photo = find_reformatted(folder, frame.file_path))
     return FramePhoto{*photo, false, false, true};
@@ -145,12 +163,15 @@ void warn_of_angles(const TransformsFile& file,
       file.path.string(), contradicting, file.frames.size(), focal, angle_focal);
 }
 
-/// The mask or depth map `path` of a frame. Its folder tells it from the photo of the same name.
+/// The mask or depth map `path` of a frame, in the file's folder or `other`, if there is one. Its
+/// folder tells it from the photo of the same name.
 fs::path named_by(const TransformsFile& file,
                   const TransformsFrame& frame,
                   const char* what,
-                  const std::string& path) {
+                  const std::string& path,
+                  const fs::path& other) {
   fs::path found = find_beside(file.path.parent_path(), path, 2);
+  if (!other.empty() && !is_file(found)) found = other / path;
   if (!is_file(found)) {
     throw DataError(fmt::format("{}: the {} '{}' of frame {} does not exist", file.path.string(),
                                 what, path, frame.number));
@@ -179,6 +200,7 @@ std::vector<View> transforms_views(TransformsFile& file,
                                    const DatasetOptions& options,
                                    const MaskFinder& masks) {
   const fs::path folder = file.path.parent_path();
+  const fs::path masks_beside = kScanNetMasks.of(file);
   const std::vector<FramePhoto> photos = frame_photos(file);
   std::vector<View> views;
   std::size_t moved = 0, respelt = 0, reformatted = 0, contradicting = 0;
@@ -200,10 +222,11 @@ std::vector<View> transforms_views(TransformsFile& file,
     if (photos[i].respelt && respelt++ == 0) first_respelt = frame.file_path;
     if (photos[i].reformatted && reformatted++ == 0) first_reformatted = frame.file_path;
     if (!has_image_extension(name)) name += photo.extension();
-    view.mask_path = frame.mask_path.empty() ? masks.find(name, photo)
-                                             : named_by(file, frame, "mask", frame.mask_path);
+    view.mask_path = frame.mask_path.empty()
+                         ? masks.find(name, photo)
+                         : named_by(file, frame, "mask", frame.mask_path, masks_beside);
     if (!frame.depth_path.empty())
-      view.depth_path = named_by(file, frame, "depth map", frame.depth_path);
+      view.depth_path = named_by(file, frame, "depth map", frame.depth_path, {});
     const ImageSize size = image_size(photo);
     Camera nominal =
         frame_camera(file, i, frame.width.value_or(size.width), frame.height.value_or(size.height));

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "raysplats/dataset.hpp"
-#include "unit/io/data_sets.hpp"
+#include "unit/io/transforms_fixture.hpp"
 #include "unit/log_capture.hpp"
 
 using namespace raysplats;
@@ -70,4 +70,35 @@ TEST_CASE("lists that all name every frame count as none") {
   CHECK(dataset.indices(Split::kTest) == std::vector<std::size_t>{0});
   CHECK(log.contains("they are not used"));
   CHECK(log.lines() == 1);
+}
+
+TEST_CASE(
+    "frames to test in a list of their own are held out, unless lists of names say otherwise") {
+  const Scratch scratch;
+  std::string train, test;
+  for (int i = 0; i < 6; ++i) {
+    const std::string name = fmt::format("f{}.png", i);
+    write_image(scratch / name, Image(10, 10, 3));
+    std::string& frames = i < 4 ? train : test;
+    if (!frames.empty()) frames += ",";
+    frames += frame(name, i);
+  }
+  const auto loaded = [&](const std::string& keys) {
+    write_bytes(scratch / "transforms.json",
+                file_of("\"w\": 10, \"h\": 10, \"fl_x\": 20, " + keys, train));
+    return load_dataset(scratch.path());
+  };
+  const Dataset dataset = loaded("\"test_frames\": [" + test + "], ");
+  REQUIRE(dataset.views.size() == 6);
+  CHECK(dataset.indices(Split::kTest) == std::vector<std::size_t>{4, 5});
+  CHECK(loaded("\"test_frames\": [], ").views.size() == 4);
+  const Dataset named = loaded(
+      "\"train_filenames\": [\"f1.png\", \"f4.png\"], \"test_filenames\": [\"f0.png\"], "
+      "\"test_frames\": [" +
+      test + "], ");
+  REQUIRE(named.views.size() == 3);
+  CHECK(named.indices(Split::kTest) == std::vector<std::size_t>{0});
+  CHECK(contains(data_error([&] { loaded("\"test_frames\": 3, "); }), "'test_frames' is no list"));
+  CHECK(contains(data_error([&] { loaded("\"test_frames\": [{\"file_path\": \"f4.png\"}], "); }),
+                 "test frame 0: the transform_matrix is missing"));
 }

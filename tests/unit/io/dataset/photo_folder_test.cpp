@@ -8,7 +8,7 @@
 #include <string>
 
 #include "raysplats/dataset.hpp"
-#include "unit/io/data_sets.hpp"
+#include "unit/io/transforms_fixture.hpp"
 #include "unit/log_capture.hpp"
 
 using namespace raysplats;
@@ -45,6 +45,33 @@ TEST_CASE("ScanNet++: the folder of the camera's photos is a data set with masks
   CHECK(std::count_if(dataset.views.begin(), dataset.views.end(),
                       [](const View& view) { return !view.mask_path.empty(); }) == 1);
   CHECK(contains(data_error([&] { load_dataset(scratch.path()); }), "/dslr is one"));
+}
+
+TEST_CASE("ScanNet++: what its transforms files name lies beside their folder") {
+  const Scratch scratch;
+  const auto write = [&](const std::string& name, const std::string& keys) {
+    write_bytes(scratch / ("dslr/nerfstudio/" + name),
+                file_of("\"w\": 20, \"h\": 10, \"fl_x\": 20, \"test_frames\": [" +
+                            frame("1.png", 2) + "], ",
+                        frame("0.png", 1, keys)));
+  };
+  write("transforms.json", "");
+  write("transforms_undistorted.json", "\"mask_path\": \"0.png\", ");
+  for (const char* name : {"0.png", "1.png"}) {
+    for (const char* folder : {"resized_images", "resized_undistorted_images"})
+      write_image(scratch / "dslr" / folder / name, Image(20, 10, 3, 0.5f));
+    write_image(scratch / "dslr/resized_undistorted_masks" / name, Image(20, 10, 1, 1.0f));
+  }
+  const Dataset dataset = load_dataset(scratch / "dslr/nerfstudio");
+  REQUIRE(dataset.views.size() == 2);
+  CHECK(dataset.views[1].test);
+  CHECK(dataset.views[1].camera.name == "1.png");
+  CHECK(contains(dataset.views[0].image_path.string(), "/resized_images/"));
+  CHECK(dataset.views[0].mask_path.empty());
+  const Dataset undistorted = load_dataset(scratch / "dslr/nerfstudio/transforms_undistorted.json");
+  REQUIRE(undistorted.views.size() == 2);
+  CHECK(contains(undistorted.views[0].image_path.string(), "/resized_undistorted_images/"));
+  CHECK(contains(undistorted.views[0].mask_path.string(), "/resized_undistorted_masks/"));
 }
 
 TEST_CASE("photos beside the model, and those in images, go before folders of other names") {
