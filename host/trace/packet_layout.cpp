@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 
 #include "raysplats/error.hpp"
 
@@ -56,6 +57,49 @@ int default_lanes(const DeviceInfo& device, PacketShape shape) {
   return lanes;
 }
 
+/// What the options say, and what they leave open.
+struct PacketChoice {
+  PacketShape shape;
+  int lanes;
+  bool sized;  ///< a compiler that can choose the size of subgroups is to give them so many lanes
+};
+
+PacketChoice choose_packets(const DeviceInfo& device, const TraceOptions& options) {
+  PacketChoice choice{options.packet_shape, options.packet_width,
+                      options.packet_shape == PacketShape::kSubgroup};
+  if (choice.sized && !device.has_subgroups) {
+    throw DeviceError(
+        fmt::format("{} has no subgroups (cl_khr_subgroups): choose --packet-shape group, vector "
+                    "or auto",
+                    device.name));
+  }
+  const auto& tuning = device.tuning;
+  if (tuning && choice.lanes == 0 &&
+      (choice.shape == PacketShape::kAuto || choice.shape == tuned_shape(*tuning)) &&
+      (device.has_subgroups || !tuning->subgroups))
+    return {tuned_shape(*tuning), tuning->packet_width, tuning->subgroups};
+  if (choice.shape == PacketShape::kAuto) choice.shape = default_shape(device, choice.lanes);
+  if (choice.lanes == 0) choice.lanes = default_lanes(device, choice.shape);
+  return choice;
+}
+
+/// Throws unless there are packets of so many rays in that shape, and the device has room for them.
+void check_lanes(const DeviceInfo& device, int lanes, bool grouped) {
+  const bool known = std::has_single_bit(static_cast<unsigned>(std::max(lanes, 0)));
+  if (grouped && !(known && lanes >= 8 && lanes <= 64))
+    throw UsageError(fmt::format("--packet-width {} in a group: choose 8, 16, 32 or 64", lanes));
+  if (!grouped && !(known && lanes <= 16)) {
+    throw UsageError(
+        fmt::format("--packet-width {}: choose 1, 2, 4, 8 or 16, or 32 or 64 in a group", lanes));
+  }
+  if (grouped && !takes_groups(device, lanes)) {
+    throw DeviceError(fmt::format(
+        "{} has {} work-items and {} bytes of local memory a work-group, packets of {} "
+        "work-items need more: choose --packet-shape vector or a smaller --packet-width",
+        device.name, device.max_work_group_size, device.local_memory, lanes));
+  }
+}
+
 }  // namespace
 
 PacketShape tuned_shape(const DeviceTuning& tuning) {
@@ -64,76 +108,23 @@ PacketShape tuned_shape(const DeviceTuning& tuning) {
 }
 
 PacketLayout packet_layout(const DeviceInfo& device, const TraceOptions& options) {
-  PacketShape shape = options.packet_shape;
-  int lanes = options.packet_width;
-  const auto& tuning = device.tuning;
-  if (shape == PacketShape::kSubgroup && !device.has_subgroups) {
-    throw DeviceError(
-        fmt::format("{} has no subgroups (cl_khr_subgroups): choose --packet-shape group, vector "
-                    "or auto",
-                    device.name));
-  }
-  bool sized = shape == PacketShape::kSubgroup;
-  if (tuning && lanes == 0 && (shape == PacketShape::kAuto || shape == tuned_shape(*tuning)) &&
-      (device.has_subgroups || !tuning->subgroups)) {
-    shape = tuned_shape(*tuning);
-    lanes = tuning->packet_width;
-    sized = tuning->subgroups;
-  }
-  if (shape == PacketShape::kAuto) shape = default_shape(device, lanes);
-  if (lanes == 0) lanes = default_lanes(device, shape);
-
+  const auto [shape, lanes, sized] = choose_packets(device, options);
   PacketLayout layout;
   layout.grouped = shape != PacketShape::kVector;
   layout.subgroups = shape == PacketShape::kSubgroup;
   layout.sized = layout.subgroups && sized;
   layout.lanes = lanes;
+  check_lanes(device, lanes, layout.grouped);
   // Single rays are for devices that run many work-items at once: they have no room for queues.
   layout.block = lanes > 1 && !layout.grouped ? 2 : 1;
-  switch (lanes) {
-    case 1:
-      break;
-    case 2:
-      layout.width = 2;
-      break;
-    case 4:
-      layout.width = layout.height = 2;
-      break;
-    case 8:
-      layout.width = 4;
-      layout.height = 2;
-      break;
-    case 16:
-      layout.width = layout.height = 4;
-      break;
-    case 32:
-      layout.width = 8;
-      layout.height = 4;
-      break;
-    case 64:
-      layout.width = layout.height = 8;
-      break;
-    default:
-      lanes = 0;
-  }
-  if (lanes == 0 || (layout.grouped ? lanes < 8 : lanes > 16)) {
-    throw UsageError(
-        layout.grouped
-            ? fmt::format("--packet-width {} in a group: choose 8, 16, 32 or 64", layout.lanes)
-            : fmt::format("--packet-width {}: choose 1, 2, 4, 8 or 16, or 32 or 64 in "
-                          "a group",
-                          layout.lanes));
-  }
-  if (layout.grouped && !takes_groups(device, lanes)) {
-    throw DeviceError(fmt::format(
-        "{} has {} work-items and {} bytes of local memory a work-group, packets of {} "
-        "work-items need more: choose --packet-shape vector or a smaller --packet-width",
-        device.name, device.max_work_group_size, device.local_memory, lanes));
-  }
+  // A square, or twice as wide as high.
+  while (layout.width * layout.height < lanes)
+    (layout.width > layout.height ? layout.height : layout.width) *= 2;
   // CPUs gain from shared lists of larger tiles; GPUs need many small groups.
   const bool cpu = device.type == DeviceType::kCpu;
   layout.tile = cpu ? 32 : 16;
   layout.pending = cpu ? 96 : 48;
+  const auto& tuning = device.tuning;
   if (tuning && tuned_shape(*tuning) == shape && tuning->packet_width == lanes) {
     layout.tile = tuning->tile;
     layout.pending = tuning->pending;

@@ -94,6 +94,86 @@ void check_near(const glm::dvec3& origin) {
                   origin.x, origin.y, origin.z, io::kFarthestOrigin));
 }
 
+/// Where the numbers of a changed model go, and what they count from.
+struct Placement {
+  ModelChanges changes;    ///< of the numbers
+  glm::dvec3 origin{0.0};  ///< of positions, which are their numbers and this
+  std::string blurred;     ///< what floats lose of them; "" for nothing
+};
+
+/// Positions are their numbers in the file plus its origin, which scales and turns as they do.
+Placement placed(const Gaussians& model,
+                 const glm::dvec3& origin,
+                 io::ModelFormat format,
+                 const ModelChanges& changes,
+                 const glm::dmat3& linear) {
+  Placement out{changes, linear * origin, {}};
+  if (changes.translate != glm::dvec3(0.0)) {
+    const bool had_origin = out.origin != glm::dvec3(0.0);
+    const bool says_origin = format == io::ModelFormat::kPly;
+    out.origin += changes.translate;
+    out.changes.translate = glm::dvec3(0.0);
+    const auto blur = blur_of_moved(model, linear, changes.scale, out.origin);
+    // A file that cannot say an origin does not get one: the model would stay where it was, as it
+    // does for other programs and beside models without one. So none is given for little either.
+    const bool keeps_origin = blur && (had_origin || (says_origin && blur->much));
+    if (!keeps_origin) std::swap(out.changes.translate, out.origin);
+    if (blur && !keeps_origin) {
+      out.blurred =
+          fmt::format("32-bit numbers shift positions by {:.2g} that far away{}", blur->shift,
+                      blur->much ? ", but not in a .ply, which says an origin" : "");
+    }
+    check_near(out.origin);
+  }
+  if (std::optional<Bounds>& crop = out.changes.crop) {
+    for (int k = 0; k < 3; ++k) {
+      crop->low[static_cast<std::size_t>(k)] -= out.origin[k];
+      crop->high[static_cast<std::size_t>(k)] -= out.origin[k];
+    }
+  }
+  return out;
+}
+
+/// Moves what the options of a file say of the world.
+void move_trace(TraceOptions& trace,
+                const glm::dmat4& map,
+                double scale,
+                const std::filesystem::path& input) {
+  trace.sky = transformed(trace.sky, map);
+  const float near_depth = trace.near_depth * static_cast<float>(scale);
+  if (!std::isfinite(near_depth)) {
+    throw UsageError(
+        fmt::format("The near depth of {}, {}, would be beyond what 32-bit numbers hold: use a "
+                    "smaller scale than {}",
+                    input.string(), trace.near_depth, scale));
+  }
+  trace.near_depth = near_depth;
+}
+
+/// What a format loses of the model and of what was said with it. `leaves_out`: Gaussians, or
+/// harmonics, as was asked for.
+std::string losses_of(io::ModelFormat format,
+                      const Gaussians& model,
+                      const Placement& placement,
+                      bool leaves_out,
+                      const ModelEncoding& encoding,
+                      const std::optional<TraceOptions>& trace) {
+  std::string losses = io::losses(format, model);
+  if (!placement.blurred.empty())
+    losses = losses == io::kNoLoss ? placement.blurred : losses + ", " + placement.blurred;
+  if (leaves_out && losses == io::kNoLoss) losses = "nothing but what was asked for is left out";
+  std::string place;
+  if (placement.origin != glm::dvec3(0.0)) place = counted_from(placement.origin, format, encoding);
+  if (format == io::ModelFormat::kPly) {
+    if (!place.empty()) place += ", as its header says, which other programs pass over";
+    return losses + place;
+  }
+  if (!place.empty()) place += ", which is not said in the file";
+  const std::string unsaid = place + not_said(trace);
+  if (!unsaid.empty() && losses == io::kNoLoss) losses = "no number of the Gaussians is changed";
+  return losses + unsaid;
+}
+
 }  // namespace
 
 Conversion convert_model(const std::filesystem::path& input,
@@ -108,63 +188,20 @@ Conversion convert_model(const std::filesystem::path& input,
   const std::size_t read = model.size();
   const int degree = model.sh_degree;
   const glm::dmat4 map = movement(changes);
-  // Positions are their numbers in the file plus its origin, which scales and turns as they do.
-  const glm::dmat3 linear(map);
-  glm::dvec3 moved_origin = linear * origin_of(input);
-  ModelChanges of_numbers = changes;
-  std::string blurred;
-  if (changes.translate != glm::dvec3(0.0)) {
-    const bool had_origin = moved_origin != glm::dvec3(0.0);
-    const bool says_origin = format == io::ModelFormat::kPly;
-    moved_origin += changes.translate;
-    of_numbers.translate = glm::dvec3(0.0);
-    const auto blur = blur_of_moved(model, linear, changes.scale, moved_origin);
-    // A file that cannot say an origin does not get one: the model would stay where it was, as it
-    // does for other programs and beside models without one. So none is given for little either.
-    const bool keeps_origin = blur && (had_origin || (says_origin && blur->much));
-    if (!keeps_origin) std::swap(of_numbers.translate, moved_origin);
-    if (blur && !keeps_origin) {
-      blurred = fmt::format("32-bit numbers shift positions by {:.2g} that far away{}", blur->shift,
-                            blur->much ? ", but not in a .ply, which says an origin" : "");
-    }
-    check_near(moved_origin);
-  }
-  const std::array<double, 3> origin{moved_origin.x, moved_origin.y, moved_origin.z};
-  for (std::size_t k = 0; of_numbers.crop && k < 3; ++k)
-    of_numbers.crop->low[k] -= origin[k], of_numbers.crop->high[k] -= origin[k];
-  const Gaussians result = changed(std::move(model), of_numbers);
+  const Placement placement = placed(model, origin_of(input), format, changes, glm::dmat3(map));
+  const Gaussians result = changed(std::move(model), placement.changes);
   if (read > 0 && result.size() == 0) {
     throw UsageError(fmt::format(
         "None of the {} Gaussians of {} is left: choose a larger box or a smaller opacity", read,
         input.string()));
   }
-  if (trace) {
-    trace->sky = transformed(trace->sky, map);
-    const float near_depth = trace->near_depth * static_cast<float>(changes.scale);
-    if (!std::isfinite(near_depth)) {
-      throw UsageError(
-          fmt::format("The near depth of {}, {}, would be beyond what 32-bit numbers hold: use a "
-                      "smaller scale than {}",
-                      input.string(), trace->near_depth, changes.scale));
-    }
-    trace->near_depth = near_depth;
-  }
+  if (trace) move_trace(*trace, map, changes.scale, input);
   stop_if_interrupted();
-  write_model(output, result, encoding, trace, origin);
-  std::string losses = io::losses(format, result);
-  if (!blurred.empty()) losses = losses == io::kNoLoss ? blurred : losses + ", " + blurred;
+  const glm::dvec3& origin = placement.origin;
+  write_model(output, result, encoding, trace, {origin.x, origin.y, origin.z});
   const bool leaves_out = result.size() < read || result.sh_degree < degree;
-  if (leaves_out && losses == io::kNoLoss) losses = "nothing but what was asked for is left out";
-  std::string place;
-  if (moved_origin != glm::dvec3(0.0)) place = counted_from(moved_origin, format, encoding);
-  if (format == io::ModelFormat::kPly) {
-    if (!place.empty()) place += ", as its header says, which other programs pass over";
-    return {read, result.size(), result.sh_degree, losses + place};
-  }
-  if (!place.empty()) place += ", which is not said in the file";
-  const std::string unsaid = place + not_said(trace);
-  if (!unsaid.empty() && losses == io::kNoLoss) losses = "no number of the Gaussians is changed";
-  return {read, result.size(), result.sh_degree, losses + unsaid};
+  return {read, result.size(), result.sh_degree,
+          losses_of(format, result, placement, leaves_out, encoding, trace)};
 }
 
 }  // namespace raysplats

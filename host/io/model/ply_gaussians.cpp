@@ -8,7 +8,9 @@
 #include <bit>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "io/model/broken_gaussians.hpp"
@@ -149,74 +151,111 @@ void tell_of_form(const Columns& columns, const std::filesystem::path& path) {
   }
 }
 
-}  // namespace
+/// Turns rows of a file into Gaussians.
+class RowReader {
+ public:
+  RowReader(const io::PlyFile& file, const std::filesystem::path& path)
+      : file_(file),
+        path_(path),
+        columns_(find_columns(file, path)),
+        origin_(taken_off(file, path)) {
+    model_.sh_degree = columns_.sh_degree;
+    model_.resize(file.rows());
+  }
 
-Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite) {
-  const io::PlyFile file(path);
-  if (file.column("packed_position")) return io::read_compressed_ply(path);
-  const Columns columns = find_columns(file, path);
-  const std::array<double, 3> origin = taken_off(file, path);
-  Gaussians model;
-  model.sh_degree = columns.sh_degree;
-  model.resize(file.rows());
-  std::size_t without_rotation = 0, infinite = 0;
-  io::BrokenGaussians broken;
-  file.for_each_row([&](std::size_t row, std::span<const double> values) {
-    const auto number = [&](std::size_t column, double taken = 0.0) {
-      const auto value = static_cast<float>(values[column] - taken);
-      if (!std::isfinite(value)) broken.add(row, file.properties()[column].name);
-      return value;
-    };
-    // Whole opacities and flat Gaussians, as programs write them that know linear numbers.
-    const auto limited = [&](std::size_t column, float least, float most) {
-      const auto value = static_cast<float>(values[column]);
-      if (!std::isinf(value) || (value > 0 && most == HUGE_VALF)) return number(column);
-      ++infinite;
-      return value > 0 ? most : least;
-    };
+  void read(std::size_t row, std::span<const double> values) {
+    row_ = row;
+    values_ = values;
     for (std::size_t i = 0; i < 3; ++i) {
-      model.means[3 * row + i] = number(columns.mean[i], origin[i]);
-      model.log_scales[3 * row + i] =
-          columns.flat && i == 2 ? io::kFlatLogScale
-                                 : limited(columns.log_scale[i], io::kFlatLogScale, HUGE_VALF);
+      model_.means[3 * row + i] = number(columns_.mean[i], origin_[i]);
+      model_.log_scales[3 * row + i] =
+          columns_.flat && i == 2 ? io::kFlatLogScale
+                                  : limited(columns_.log_scale[i], io::kFlatLogScale, HUGE_VALF);
     }
-    float* quaternion = &model.quaternions[4 * row];
+    read_rotation(&model_.quaternions[4 * row]);
+    model_.opacities[row] = limited(columns_.opacity, io::logit_of(0), io::logit_of(1));
+    if (columns_.filter) {
+      widen(&model_.log_scales[3 * row], model_.opacities[row],
+            static_cast<double>(number(*columns_.filter)));
+    }
+    read_colors(&model_.sh[columns_.sh.size() * row]);
+  }
+
+  /// The model, after what is unusual has been said. Throws DataError where numbers are not finite,
+  /// unless such Gaussians are to be dropped.
+  Gaussians finish(bool drop_nonfinite) {
+    tell_of_form(columns_, path_);
+    if (infinite_ > 0) {
+      spdlog::warn(
+          "{}: {} infinite opacities and sizes of 0 are taken as the most opaque, the faintest and "
+          "the flattest that there are",
+          path_.string(), infinite_);
+    }
+    broken_.settle(model_, path_, drop_nonfinite);
+    if (without_rotation_ > 0) {
+      spdlog::warn("{}: {} Gaussians have a zero quaternion and are taken as not rotated",
+                   path_.string(), without_rotation_);
+    }
+    return std::move(model_);
+  }
+
+ private:
+  float number(std::size_t column, double taken = 0.0) {
+    const auto value = static_cast<float>(values_[column] - taken);
+    if (!std::isfinite(value)) broken_.add(row_, file_.properties()[column].name);
+    return value;
+  }
+
+  /// Whole opacities and flat Gaussians, as programs write them that know linear numbers.
+  float limited(std::size_t column, float least, float most) {
+    const auto value = static_cast<float>(values_[column]);
+    if (!std::isinf(value) || (value > 0 && most == HUGE_VALF)) return number(column);
+    ++infinite_;
+    return value > 0 ? most : least;
+  }
+
+  void read_rotation(float* quaternion) {
     double norm = 0;
     for (std::size_t i = 0; i < 4; ++i) {
-      quaternion[i] = number(columns.quaternion[i]);
+      quaternion[i] = number(columns_.quaternion[i]);
       norm += static_cast<double>(quaternion[i]) * static_cast<double>(quaternion[i]);
     }
     if (norm == 0) {
       quaternion[0] = 1.0f;
-      ++without_rotation;
+      ++without_rotation_;
     } else if (const double length = std::sqrt(norm);
                length < kShortestQuaternion || length > kLongestQuaternion) {
       const std::array<double, 4> unit = io::unit_quaternion(quaternion);
       for (std::size_t k = 0; k < 4; ++k) quaternion[k] = static_cast<float>(unit[k]);
     }
-    model.opacities[row] = limited(columns.opacity, io::logit_of(0), io::logit_of(1));
-    if (columns.filter) {
-      widen(&model.log_scales[3 * row], model.opacities[row],
-            static_cast<double>(number(*columns.filter)));
-    }
-    float* sh = &model.sh[columns.sh.size() * row];
-    for (std::size_t k = 0; k < columns.sh.size(); ++k) sh[k] = number(columns.sh[k]);
-    for (std::size_t k = 0; columns.bytes && k < 3; ++k)
-      sh[k] = static_cast<float>((values[columns.sh[k]] / 255.0 - 0.5) / io::kSh0);
-  });
-  tell_of_form(columns, path);
-  if (infinite > 0) {
-    spdlog::warn(
-        "{}: {} infinite opacities and sizes of 0 are taken as the most opaque, the faintest and "
-        "the flattest that there are",
-        path.string(), infinite);
   }
-  broken.settle(model, path, drop_nonfinite);
-  if (without_rotation > 0) {
-    spdlog::warn("{}: {} Gaussians have a zero quaternion and are taken as not rotated",
-                 path.string(), without_rotation);
+
+  void read_colors(float* sh) {
+    for (std::size_t k = 0; k < columns_.sh.size(); ++k) sh[k] = number(columns_.sh[k]);
+    for (std::size_t k = 0; columns_.bytes && k < 3; ++k)
+      sh[k] = static_cast<float>((values_[columns_.sh[k]] / 255.0 - 0.5) / io::kSh0);
   }
-  return model;
+
+  const io::PlyFile& file_;
+  const std::filesystem::path& path_;
+  Columns columns_;
+  std::array<double, 3> origin_;
+  Gaussians model_;
+  std::size_t row_ = 0;  // of values_
+  std::span<const double> values_;
+  std::size_t without_rotation_ = 0, infinite_ = 0;
+  io::BrokenGaussians broken_;
+};
+
+}  // namespace
+
+Gaussians read_ply(const std::filesystem::path& path, bool drop_nonfinite) {
+  const io::PlyFile file(path);
+  if (file.column("packed_position")) return io::read_compressed_ply(path);
+  RowReader reader(file, path);
+  file.for_each_row(
+      [&](std::size_t row, std::span<const double> values) { reader.read(row, values); });
+  return reader.finish(drop_nonfinite);
 }
 
 void write_ply(const std::filesystem::path& path,

@@ -221,6 +221,70 @@ std::vector<Camera> on_orbit(const SceneCamera& camera,
   return cameras;
 }
 
+/// The views of a data set.
+void read_data_views(io::TomlTable& table, SceneCamera& camera) {
+  camera.source = Source::kData;
+  read_views(table, camera);
+  table.choice<Split>("split", camera.split,
+                      {{"test", Split::kTest}, {"train", Split::kTrain}, {"all", Split::kAll}});
+  read_data_row(table, "test-every", camera);
+  if (const auto list = table.existing("test-list")) {
+    if (camera.data_settings.has("test-every")) {
+      table.fail("test-list",
+                 "'test-every' and 'test-list' in [camera] contradict each other: leave one out");
+    }
+    camera.data_settings.set("test-list", {list->string()});
+  }
+  read_data_row(table, "undistort", camera);
+}
+
+/// A camera at a position.
+void read_placed(io::TomlTable& table, SceneCamera& camera) {
+  camera.source = Source::kPlaced;
+  camera.target = table.vector("target");
+  if (!camera.target) table.fail("position", "[camera] has a 'position' but no 'target'");
+  if (*camera.target == *camera.position) {
+    table.fail("target", "'position' and 'target' in [camera] are the same point");
+  }
+  if (camera.model == CameraModel::kOrthographic && !camera.extent) {
+    table.fail("model",
+               "an orthographic [camera] needs 'extent', the world units along the picture's "
+               "smaller side");
+  }
+}
+
+/// A camera of the file's own: its picture, its lens, and where it stands or goes.
+void read_own_camera(io::TomlTable& table, SceneCamera& camera) {
+  camera.up = table.direction("up");
+  for (auto [key, side] :
+       {std::pair{"width", &camera.width}, std::pair{"height", &camera.height}}) {
+    int value = 0;
+    table.number(key, value, 1, kMaxSide);
+    if (value > 0) *side = value;
+  }
+  read_lens(table, camera);
+  if (table.has("orbit")) {
+    camera.source = Source::kOrbit;
+    read_orbit(*table.table("orbit"), camera);
+  } else {
+    read_placed(table, camera);
+  }
+}
+
+/// Refuses keys that the camera's source does not read. `own`: of this file, not of another.
+void refuse_idle_keys(io::TomlTable& table, const SceneCamera& camera, bool own) {
+  const bool views = camera.source == Source::kData, file = camera.source == Source::kFile;
+  for (const char* key : {"split", "test-every", "test-list", "undistort"})
+    table.only_for(key, views, "the views of 'data'");
+  table.only_for("views", views || file, "'file' and the views of 'data'");
+  table.only_for("downscale", !camera.file.empty(), "'file' and 'data'");
+  for (const char* key : {"up", "width", "height", "model", "fov", "focal", "extent",
+                          "principal-point", "k1", "k2", "k3", "k4", "p1", "p2"}) {
+    table.only_for(key, own, "'position' and 'orbit'");
+  }
+  table.only_for("target", camera.position.has_value(), "'position': an orbit has orbit.target");
+}
+
 }  // namespace
 
 SceneCamera read_scene_camera(io::TomlTable& table) {
@@ -236,65 +300,17 @@ SceneCamera read_scene_camera(io::TomlTable& table) {
                "[camera] has to be one of 'position' with 'target', 'file', 'data' and 'orbit' "
                "('data' goes with 'orbit')");
   }
+  camera.file = file ? *file : data.value_or(std::filesystem::path());
   if (file) {
     camera.source = Source::kFile;
-    camera.file = *file;
     read_views(table, camera);
   } else if (data && !orbit) {
-    camera.source = Source::kData;
-    camera.file = *data;
-    read_views(table, camera);
-    table.choice<Split>("split", camera.split,
-                        {{"test", Split::kTest}, {"train", Split::kTrain}, {"all", Split::kAll}});
-    read_data_row(table, "test-every", camera);
-    if (const auto list = table.existing("test-list")) {
-      if (camera.data_settings.has("test-every")) {
-        table.fail("test-list",
-                   "'test-every' and 'test-list' in [camera] contradict each other: leave one out");
-      }
-      camera.data_settings.set("test-list", {list->string()});
-    }
-    read_data_row(table, "undistort", camera);
+    read_data_views(table, camera);
   } else {
-    if (data) {
-      camera.file = *data;
-      read_data_row(table, "downscale", camera);
-    }
-    camera.up = table.direction("up");
-    for (auto [key, side] :
-         {std::pair{"width", &camera.width}, std::pair{"height", &camera.height}}) {
-      int value = 0;
-      table.number(key, value, 1, kMaxSide);
-      if (value > 0) *side = value;
-    }
-    read_lens(table, camera);
-    if (orbit) {
-      camera.source = Source::kOrbit;
-      read_orbit(*table.table("orbit"), camera);
-    } else {
-      camera.source = Source::kPlaced;
-      camera.target = table.vector("target");
-      if (!camera.target) table.fail("position", "[camera] has a 'position' but no 'target'");
-      if (*camera.target == *camera.position) {
-        table.fail("target", "'position' and 'target' in [camera] are the same point");
-      }
-      if (camera.model == CameraModel::kOrthographic && !camera.extent) {
-        table.fail("model",
-                   "an orthographic [camera] needs 'extent', the world units along the picture's "
-                   "smaller side");
-      }
-    }
+    if (data) read_data_row(table, "downscale", camera);
+    read_own_camera(table, camera);
   }
-  const bool views = camera.source == Source::kData;
-  for (const char* key : {"split", "test-every", "test-list", "undistort"})
-    table.only_for(key, views, "the views of 'data'");
-  table.only_for("views", views || file, "'file' and the views of 'data'");
-  table.only_for("downscale", file || data, "'file' and 'data'");
-  for (const char* key : {"up", "width", "height", "model", "fov", "focal", "extent",
-                          "principal-point", "k1", "k2", "k3", "k4", "p1", "p2"}) {
-    table.only_for(key, camera.position || orbit, "'position' and 'orbit'");
-  }
-  table.only_for("target", camera.position.has_value(), "'position': an orbit has orbit.target");
+  refuse_idle_keys(table, camera, camera.position || orbit);
   table.finish();
   return camera;
 }

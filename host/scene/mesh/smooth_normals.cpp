@@ -68,18 +68,14 @@ Faces measure(const Mesh& mesh, const glm::dmat3& placement) {
   return faces;
 }
 
-}  // namespace
-
-void add_smooth_normals(Mesh& mesh, double crease_degrees, const glm::dmat3& placement) {
-  const Faces faces = measure(mesh, placement);
-  // A normal is placed by the inverse transpose, so the transpose takes it back.
-  const glm::dmat3 back = glm::transpose(placement);
+/// Joins the corners of triangles that meet in an edge below the crease angle: one normal for each
+/// set.
+Sets sets_of_corners(const Mesh& mesh, const Faces& faces, double crease_degrees) {
   const std::vector<MeshEdge> edges = sorted_edges(mesh);
   // The tolerance keeps an edge of exactly the crease angle smooth.
   const double least_cosine =
       std::cos(std::clamp(crease_degrees, 0.0, 180.0) * std::numbers::pi / 180.0) - 1e-6;
-  const std::size_t corners = mesh.triangles.size();
-  Sets sets(corners);
+  Sets sets(mesh.triangles.size());
   for (std::size_t i = 1; i < edges.size(); ++i) {
     const MeshEdge& a = edges[i - 1];
     const MeshEdge& b = edges[i];
@@ -91,6 +87,18 @@ void add_smooth_normals(Mesh& mesh, double crease_degrees, const glm::dmat3& pla
     sets.join(a.low_corner, b.low_corner);
     sets.join(a.high_corner, b.high_corner);
   }
+  return sets;
+}
+
+/// The normal of a corner, and the set of corners that share it.
+struct CornerNormal {
+  glm::dvec3 normal;
+  std::size_t set;
+};
+
+/// Means over the sets of corners, weighted by the corners' angles; not of unit length.
+std::vector<CornerNormal> corner_normals(const Faces& faces, Sets& sets) {
+  const std::size_t corners = faces.angles.size();
   std::vector<glm::dvec3> sums(corners, glm::dvec3(0.0));
   std::vector<double> weights(corners, 0.0);
   for (std::size_t corner = 0; corner < corners; ++corner) {
@@ -98,48 +106,68 @@ void add_smooth_normals(Mesh& mesh, double crease_degrees, const glm::dmat3& pla
     sums[set] += faces.angles[corner] * faces.normals[corner / 3];
     if (faces.normals[corner / 3] != glm::dvec3(0.0)) weights[set] += faces.angles[corner];
   }
-
-  constexpr std::size_t kUnused = SIZE_MAX;
-  const std::size_t vertices = mesh.vertex_count();
-  mesh.normals.assign(3 * vertices, 0.0f);
-  for (std::size_t i = 0; i < vertices; ++i) mesh.normals[3 * i + 2] = 1.0f;
-  std::vector<std::size_t> first_set(vertices, kUnused);
-  std::map<std::pair<std::uint32_t, std::size_t>, std::uint32_t> copies;
+  std::vector<CornerNormal> out(corners);
   for (std::size_t corner = 0; corner < corners; ++corner) {
-    std::size_t set = sets.find(corner);
-    glm::dvec3 normal = sums[set];
+    const std::size_t set = sets.find(corner);
     // Normals that cancel out say nothing: such a corner takes that of its own triangle.
-    if (glm::length(normal) <= 1e-6 * weights[set]) {
-      normal = faces.normals[corner / 3];
-      set = corners + corner;
+    const bool cancelled = glm::length(sums[set]) <= 1e-6 * weights[set];
+    out[corner] = cancelled ? CornerNormal{faces.normals[corner / 3], corners + corner}
+                            : CornerNormal{sums[set], set};
+  }
+  return out;
+}
+
+/// Gives corners vertices: the first set of corners at a vertex keeps it, each other one gets a
+/// copy.
+class VertexCopies {
+ public:
+  explicit VertexCopies(Mesh& mesh) : mesh_(mesh), first_set_(mesh.vertex_count(), kUnused) {}
+
+  std::uint32_t vertex_of(std::size_t corner, std::size_t set) {
+    const std::uint32_t vertex = mesh_.triangles[corner];
+    if (first_set_[vertex] == kUnused) first_set_[vertex] = set;
+    if (first_set_[vertex] == set) return vertex;
+    const auto [copy, added] =
+        copies_.emplace(std::pair(vertex, set), static_cast<std::uint32_t>(mesh_.vertex_count()));
+    if (added) append(vertex);
+    return mesh_.triangles[corner] = copy->second;
+  }
+
+ private:
+  static constexpr std::size_t kUnused = SIZE_MAX;
+
+  void append(std::size_t vertex) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      mesh_.positions.push_back(mesh_.positions[3 * vertex + c]);
+      mesh_.normals.push_back(0.0f);
     }
-    normal = back * normal;
-    const double length = glm::length(normal);
-    normal = length > 0.0 ? normal / length : glm::dvec3(0.0, 0.0, 1.0);
-    std::uint32_t vertex = mesh.triangles[corner];
-    if (first_set[vertex] == kUnused) {
-      first_set[vertex] = set;
-    } else if (first_set[vertex] != set) {
-      const auto [copy, added] =
-          copies.emplace(std::pair(vertex, set), static_cast<std::uint32_t>(mesh.vertex_count()));
-      if (added) {
-        for (std::size_t c = 0; c < 3; ++c) {
-          mesh.positions.push_back(mesh.positions[3 * std::size_t{vertex} + c]);
-          mesh.normals.push_back(0.0f);
-        }
-        if (!mesh.uvs.empty()) {
-          for (std::size_t c = 0; c < 2; ++c) {
-            mesh.uvs.push_back(mesh.uvs[2 * std::size_t{vertex} + c]);
-          }
-        }
-      }
-      vertex = copy->second;
-      mesh.triangles[corner] = vertex;
-    }
-    for (int c = 0; c < 3; ++c) {
-      mesh.normals[3 * std::size_t{vertex} + static_cast<std::size_t>(c)] =
-          static_cast<float>(normal[c]);
-    }
+    for (std::size_t c = 0; !mesh_.uvs.empty() && c < 2; ++c)
+      mesh_.uvs.push_back(mesh_.uvs[2 * vertex + c]);
+  }
+
+  Mesh& mesh_;
+  std::vector<std::size_t> first_set_;
+  std::map<std::pair<std::uint32_t, std::size_t>, std::uint32_t> copies_;
+};
+
+}  // namespace
+
+void add_smooth_normals(Mesh& mesh, double crease_degrees, const glm::dmat3& placement) {
+  const Faces faces = measure(mesh, placement);
+  Sets sets = sets_of_corners(mesh, faces, crease_degrees);
+  const std::vector<CornerNormal> normals = corner_normals(faces, sets);
+  mesh.normals.assign(mesh.positions.size(), 0.0f);
+  for (std::size_t i = 2; i < mesh.normals.size(); i += 3) mesh.normals[i] = 1.0f;
+  // A normal is placed by the inverse transpose, so the transpose takes it back.
+  const glm::dmat3 back = glm::transpose(placement);
+  VertexCopies copies(mesh);
+  for (std::size_t corner = 0; corner < normals.size(); ++corner) {
+    const glm::dvec3 placed = back * normals[corner].normal;
+    const double length = glm::length(placed);
+    const glm::dvec3 normal = length > 0.0 ? placed / length : glm::dvec3(0.0, 0.0, 1.0);
+    const std::size_t vertex = copies.vertex_of(corner, normals[corner].set);
+    for (int c = 0; c < 3; ++c)
+      mesh.normals[3 * vertex + static_cast<std::size_t>(c)] = static_cast<float>(normal[c]);
   }
 }
 
