@@ -14,9 +14,10 @@ namespace {
 
 /// What -h leaves out: choices of speed, and numbers whose defaults are good for nearly all.
 constexpr std::array kRare{
-    "profile",      "no-kernel-cache", "quantile",      "min-transmittance", "max-hits",
-    "packet-shape", "packet-width",    "memory-budget", "launch-budget-ms",  "traversal",
-    "undistort",    "test-every",      "test-list",     "path-transform",    "path-data"};
+    "profile",          "no-kernel-cache", "quantile",       "min-transmittance",
+    "max-hits",         "packet-shape",    "packet-width",   "memory-budget",
+    "launch-budget-ms", "traversal",       "undistort",      "ignore-areas",
+    "test-every",       "test-list",       "path-transform", "path-data"};
 /// What it shows of the hundred options of `train`.
 constexpr std::array kTraining{
     "help",     "help-all",      "data",      "output",         "resume",   "time",

@@ -141,8 +141,8 @@ CLI::Option* add_data_flags(CLI::App& app, DataFlags& flags, const std::string& 
   app.add_option("--split", flags.split, split)
       ->group(group)
       ->check(one_of({"test", "train", "all"}));
-  for (const char* name :
-       {"downscale", "test-every", "test-list", "undistort", "masks", "alpha", "borders"})
+  for (const char* name : {"downscale", "test-every", "test-list", "undistort", "masks", "alpha",
+                           "borders", "ignore-areas"})
     add_setting(app, flags.settings, name)->group(group);
   return data;
 }
@@ -165,11 +165,12 @@ DatasetOptions DataFlags::over(DatasetOptions run, bool all) const {
 void DataFlags::check_used(bool orbit) const {
   const bool chosen = split || settings.has("test-every") || settings.has("test-list");
   const bool about_photos = settings.has("undistort") || settings.has("masks") ||
-                            settings.has("alpha") || settings.has("borders");
+                            settings.has("alpha") || settings.has("borders") ||
+                            settings.has("ignore-areas");
   if (data.empty() && (chosen || about_photos)) {
     throw UsageError(
-        "--split, --test-every, --test-list, --undistort, --masks, --alpha and --borders are about "
-        "the views of a data set: add --data DATASET");
+        "--split, --test-every, --test-list, --undistort, --masks, --alpha, --borders and "
+        "--ignore-areas are about the views of a data set: add --data DATASET");
   }
   if (orbit && chosen) {
     throw UsageError(

@@ -80,7 +80,7 @@ CLI::Option* add_data_flags(CLI::App& app,
                             const std::string& split = "test (default), train or all");
 DataError no_views(const DataFlags& flags);
 /// Which photos are held out, and what of them counts, for commands that say what a data set is.
-inline constexpr std::array kPhotoFlags{"test-every", "test-list", "borders"};
+inline constexpr std::array kPhotoFlags{"test-every", "test-list", "borders", "ignore-areas"};
 void add_photo_flags(CLI::App& app, DataSettings& settings);
 
 /// --overwrite: outputs may take the place of what is there. `help` says of what.

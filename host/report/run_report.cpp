@@ -197,7 +197,8 @@ std::string configuration(const fs::path& run) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return "<p>There is no config.toml that tells them.</p>\n";
   const std::string text = text_of(file);
-  const std::map<std::string, std::string> defaults = settings(to_toml({}));
+  const TrainOptions usual;
+  const std::map<std::string, std::string> defaults = settings(to_toml(usual));
   std::string changed;
   for (const auto& [key, value] : settings(text)) {
     const auto usual = defaults.find(key);

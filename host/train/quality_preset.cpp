@@ -71,7 +71,7 @@ QualityChoice choose_quality(Quality quality, const Dataset& dataset, DeviceType
   const int side = level.side * (device == DeviceType::kCpu ? 1 : kFasterDevices);
   QualityChoice out;
   // Few photos are known by heart before the least of a level is over.
-  const std::int64_t least = std::min(level.least, run_length({}, views));
+  const std::int64_t least = std::min(level.least, usual_length(views));
   out.iterations = std::clamp(level.passes * static_cast<std::int64_t>(views), least, level.most);
   out.downscale = (longest + side - 1) / side;
   return out;

@@ -27,7 +27,7 @@ struct QualityChoice {
 };
 
 /// `dataset` at its full size. Iterations are passes over the training photos within limits, the
-/// lower of which gives way to what few photos ask for (run_length()); photos are reduced as the
+/// lower of which gives way to what few photos ask for (usual_length()); photos are reduced as the
 /// median one of their longest sides asks for, which may be half as long on CPUs as elsewhere. Of a
 /// strip the longest side is that of as many pixels in the shape 2:1.
 QualityChoice choose_quality(Quality quality, const Dataset& dataset, DeviceType device);

@@ -77,9 +77,12 @@ constexpr double kUsualDecay = 0.01;  // after twice as many
 
 }  // namespace
 
-std::int64_t run_length(const TrainOptions& options, std::size_t photos) {
-  if (options.iterations != kFittedLength) return options.iterations;
+std::int64_t usual_length(std::size_t photos) {
   return std::clamp(kPasses * static_cast<std::int64_t>(photos), kShortestFitted, kLongestFitted);
+}
+
+std::int64_t run_length(const TrainOptions& options, std::size_t photos) {
+  return options.iterations != kFittedLength ? options.iterations : usual_length(photos);
 }
 
 bool clears_random_start(const TrainOptions& options) {

@@ -127,10 +127,35 @@ std::vector<SmallPhoto> photos_for_marks(const Dataset& dataset,
   return load_small_photos(chosen, all, kMarkSide, progress);
 }
 
-void warn_of_marks(std::span<const SmallPhoto> read) {
+// What to do about marks.
+std::string without_marks(const Dataset& dataset,
+                          std::span<const StillMark> marks,
+                          const SmallPhoto& photo,
+                          const Camera& source) {
+  if (dataset.alpha_is_background) return "leave it out by masks that are black there";
+  std::vector<double> numbers;
+  for (const PhotoArea& area :
+       dataset.read_as ? dataset.read_as->ignore_areas : std::vector<PhotoArea>())
+    numbers.insert(numbers.end(), {area.left, area.top, area.right, area.bottom});
+  for (const StillMark& mark : marks) {
+    const PhotoArea area = area_of(mark, photo.camera, source);
+    numbers.insert(numbers.end(), {area.left, area.top, area.right, area.bottom});
+  }
+  return fmt::format("leave it out by --ignore-areas {}", fmt::join(numbers, ","));
+}
+
+// `views`: of which the photos are.
+void warn_of_marks(const Dataset& dataset,
+                   std::span<const SmallPhoto> read,
+                   std::span<const std::size_t> views) {
   const std::vector<StillMark> marks = still_marks(read);
   if (marks.empty()) return;
   const StillMark& mark = marks.front();
+  const auto photo = std::find_if(read.begin(), read.end(), [&](const SmallPhoto& each) {
+    return glm::ivec2(each.picture->width, each.picture->height) == mark.size;
+  });
+  const Camera& source =
+      dataset.views[views[static_cast<std::size_t>(photo - read.begin())]].source_camera;
   const glm::dvec2 size(mark.size);
   const glm::dvec2 low = 100.0 * glm::dvec2(mark.low) / size;
   const glm::dvec2 high = 100.0 * glm::dvec2(mark.high + 1) / size;
@@ -138,14 +163,14 @@ void warn_of_marks(std::span<const SmallPhoto> read) {
       "something stands at the same pixels of all photos, as a logo, a date or what does not turn "
       "with a turntable: {}from {:.0f} to {:.0f} % of their width and from {:.0f} to {:.0f} % of "
       "their height (from the top left); it is learned as a part of the scene, so crop it off, or "
-      "leave it out by masks that are black there",
+      "{}",
       marks.size() > 1 ? fmt::format("in {} places, the clearest ", marks.size()) : "", low.x,
-      high.x, low.y, high.y);
+      high.x, low.y, high.y, without_marks(dataset, marks, *photo, source));
 }
 
 // A length is the user's to choose, and that of a run by time nobody knows beforehand.
 void note_many_passes(const TrainOptions& options, std::size_t photos) {
-  const std::int64_t asked = run_length({}, photos);
+  const std::int64_t asked = usual_length(photos);
   const std::int64_t views = last_iteration(options) * options.views_per_step;
   if (photos > kFewPhotos || views <= kLongRun * asked) return;
   spdlog::info(
@@ -352,8 +377,9 @@ void Trainer::Impl::warn_of_photos() {
   const std::vector<std::size_t> all = first_views();
   const std::vector<std::size_t> views = evenly_spread(all, count);
   warn_of_grey_photos(read, all.size());
-  warn_of_marks(photos_for_marks(dataset, evenly_spread(all, kMarkPhotos),
-                                 {shows_progress ? stderr : nullptr}));
+  const std::vector<std::size_t> marked = evenly_spread(all, kMarkPhotos);
+  warn_of_marks(dataset, photos_for_marks(dataset, marked, {shows_progress ? stderr : nullptr}),
+                marked);
   warn_of_inverted_masks(dataset, masked_out(dataset, read, views, options.seed));
 }
 

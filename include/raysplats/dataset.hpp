@@ -57,6 +57,13 @@ struct PhotoBorder {
   bool operator==(const PhotoBorder&) const = default;
 };
 
+/// A box of a picture, in shares of its width and height from the top left: 0 <= left < right <= 1
+/// and 0 <= top < bottom <= 1.
+struct PhotoArea {
+  double left = 0, top = 0, right = 1, bottom = 1;
+  bool operator==(const PhotoArea&) const = default;
+};
+
 /// One photo and the camera that took it, at the size it is used (after --downscale).
 struct View {
   Camera camera;                     ///< of the picture that load_view_image() gives
@@ -69,6 +76,7 @@ struct View {
   Camera source_camera;     ///< of the photo on disk, with its lens
   int sample_bytes = 1;     ///< of a number in the photo on disk: 1, 2 or 4 (floats)
   std::shared_ptr<const PhotoBorder> border;  ///< which does not count; null: there is none
+  std::vector<PhotoArea> ignored;             ///< of the photo on disk, which do not count either
   bool test = false;                          ///< held out
 };
 
@@ -100,6 +108,9 @@ struct DatasetOptions {
   AlphaUse alpha = AlphaUse::kAuto;  ///< what transparent in photos means
   /// What a black border means that all photos have. None is looked for where photos are cut out.
   BorderUse borders = BorderUse::kAuto;
+  /// What does not count of any photo, as it is on disk: logos, dates, what a drone shows over its
+  /// picture. Not of cut-out photos.
+  std::vector<PhotoArea> ignore_areas = {};
   /// What is taken off all positions, finite numbers up to 1e9; none = 0, but a point near the
   /// cameras where the scene lies so far from the origin of its files (surveyed captures) that
   /// single precision would blur it.

@@ -160,6 +160,20 @@ def test_photos_with_bars(folder, tmp_path):
     assert rs.Dataset.load(tmp_path / "video", borders="keep").views[0].picture()[..., 3].all()
 
 
+def test_areas_to_ignore(folder):
+    dataset = rs.Dataset.load(folder, ignore_areas=[(0, 0, 0.5, 0.25)])
+    height = dataset.views[0].camera.height
+    assert dataset.views[0].camera.height % 4 == 0 and dataset.views[0].camera.width % 2 == 0
+    for each in assert_copies(dataset.views[0]):
+        alpha = each.picture()[..., 3]
+        assert not alpha[: height // 4, : alpha.shape[1] // 2].any()
+        assert alpha[height // 4 :].all() and alpha[:, alpha.shape[1] // 2 :].all()
+    for each in pickle.loads(pickle.dumps(dataset)).views:
+        assert not each.picture()[0, 0, 3]
+    with pytest.raises(rs.UsageError, match="is no box"):
+        rs.Dataset.load(folder, ignore_areas=[(0.5, 0, 0.5, 1)])
+
+
 def test_states_of_other_versions_are_refused():
     new = rs.TraceOptions.__new__(rs.TraceOptions)
     with pytest.raises(rs.UsageError, match="TraceOptions has no attribute 'quantil'"):

@@ -29,6 +29,21 @@
 namespace raysplats::python {
 namespace {
 
+/// Left, top, right and bottom of boxes.
+using Areas = std::vector<std::array<double, 4>>;
+
+std::vector<PhotoArea> areas_of(const Areas& boxes) {
+  std::vector<PhotoArea> out;
+  for (const auto& [left, top, right, bottom] : boxes) out.push_back({left, top, right, bottom});
+  return out;
+}
+
+Areas boxes_of(const std::vector<PhotoArea>& areas) {
+  Areas out;
+  for (const auto& [left, top, right, bottom] : areas) out.push_back({left, top, right, bottom});
+  return out;
+}
+
 /// The arguments of Dataset.load() in their order, as DatasetOptions.
 using OptionsState = std::tuple<double,
                                 int,
@@ -37,10 +52,12 @@ using OptionsState = std::tuple<double,
                                 std::string,
                                 std::string,
                                 std::string,
+                                Areas,
                                 std::optional<std::array<double, 3>>>;
 
 DatasetOptions options_of(const OptionsState& state) {
-  const auto& [downscale, test_every, test_list, undistort, masks, alpha, borders, origin] = state;
+  const auto& [downscale, test_every, test_list, undistort, masks, alpha, borders, areas, origin] =
+      state;
   DatasetOptions options;
   options.downscale = downscale;
   options.test_every = test_every;
@@ -49,6 +66,7 @@ DatasetOptions options_of(const OptionsState& state) {
   options.masks = value_of(kMaskUses, "masks", masks);
   options.alpha = value_of(kAlphaUses, "alpha", alpha);
   options.borders = value_of(kBorderUses, "borders", borders);
+  options.ignore_areas = areas_of(areas);
   options.origin = origin;
   return options;
 }
@@ -58,7 +76,7 @@ std::optional<OptionsState> options_state(const Dataset& dataset) {
   const DatasetOptions& o = *dataset.read_as;
   return OptionsState(o.downscale, o.test_every, o.test_list, o.undistort,
                       name_of(kMaskUses, o.masks), name_of(kAlphaUses, o.alpha),
-                      name_of(kBorderUses, o.borders), o.origin);
+                      name_of(kBorderUses, o.borders), boxes_of(o.ignore_areas), o.origin);
 }
 
 /// A file of names, or the names themselves.
@@ -79,9 +97,10 @@ Dataset load(const std::filesystem::path& path,
              const std::string& masks,
              const std::string& alpha,
              const std::string& borders,
+             const Areas& ignore_areas,
              const std::optional<std::array<double, 3>>& origin) {
   return load_dataset(path, options_of({downscale, test_every, names_of(test_list), undistort,
-                                        masks, alpha, borders, origin}));
+                                        masks, alpha, borders, ignore_areas, origin}));
 }
 
 FloatView picture(const View& self) {
@@ -100,7 +119,8 @@ std::optional<std::filesystem::path> path_or_none(const std::filesystem::path& p
 
 using Paths = std::array<std::optional<std::filesystem::path>, 3>;
 using Border = std::optional<std::array<std::vector<int>, 4>>;
-using ViewState = std::tuple<Camera, Camera, Paths, IndexArray, bool, bool, int, Border, bool>;
+using ViewState =
+    std::tuple<Camera, Camera, Paths, IndexArray, bool, bool, int, Border, Areas, bool>;
 using DatasetState = std::tuple<std::string,
                                 std::filesystem::path,
                                 std::vector<View>,
@@ -133,7 +153,7 @@ std::shared_ptr<const PhotoBorder> border_of(const Border& state, const Camera& 
 
 View view_of(const ViewState& state) {
   const auto& [camera, source_camera, paths, points, mask_apart, mask_cuts, sample_bytes, border,
-               test] = state;
+               ignored, test] = state;
   View out;
   out.camera = camera;
   out.source_camera = source_camera;
@@ -145,6 +165,7 @@ View view_of(const ViewState& state) {
   out.mask_cuts = mask_cuts;
   out.sample_bytes = sample_bytes;
   out.border = border_of(border, source_camera);
+  out.ignored = areas_of(ignored);
   out.test = test;
   return out;
 }
@@ -187,7 +208,8 @@ void bind_view(nb::module_& module) {
                                Paths{path_or_none(v.image_path), path_or_none(v.mask_path),
                                      path_or_none(v.depth_path)},
                                view(self, v.points.data(), {v.points.size()}), v.mask_apart,
-                               v.mask_cuts, v.sample_bytes, border_state(v), v.test);
+                               v.mask_cuts, v.sample_bytes, border_state(v), boxes_of(v.ignored),
+                               v.test);
            })
       .def(
           "__setstate__",
@@ -207,10 +229,12 @@ void bind_datasets(nb::module_& module) {
           "load", &load, nb::arg("path"), nb::kw_only(), nb::arg("downscale") = 1.0,
           nb::arg("test_every") = 8, nb::arg("test_list") = nb::none(), nb::arg("undistort") = true,
           nb::arg("masks") = "ignore", nb::arg("alpha") = "auto", nb::arg("borders") = "auto",
-          nb::arg("origin") = nb::none(), nb::call_guard<nb::gil_scoped_release>(),
+          nb::arg("ignore_areas") = Areas{}, nb::arg("origin") = nb::none(),
+          nb::call_guard<nb::gil_scoped_release>(),
           "Reads a COLMAP, nerfstudio, Blender, LLFF or Polycam folder, everything but the pixels. "
           "test_list: names of the photos that are held out, or a file of them, in place of those "
-          "that test_every and files of the data set say.")
+          "that test_every and files of the data set say. ignore_areas: (left, top, right, bottom) "
+          "of boxes that count of no photo, in shares of width and height from the top left.")
       .def_prop_ro(
           "kind", [](const Dataset& self) { return name_of(kDatasetKinds, self.kind); },
           "'colmap', 'blender', 'nerfstudio', 'llff' or 'polycam'.")

@@ -10,8 +10,10 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "io/dataset/data_origin.hpp"
+#include "io/dataset/dataset_photos.hpp"
 #include "io/dataset/test_list.hpp"
 #include "raysplats/error.hpp"
 #include "util/number_text.hpp"
@@ -83,6 +85,38 @@ void add_test_list_option(OptionTable& table, DatasetOptions& options) {
       });
 }
 
+void add_ignore_areas_option(OptionTable& table, DatasetOptions& options) {
+  constexpr std::size_t kNumbers = 4;
+  table.add(
+      "ignore-areas",
+      "boxes of the photos that count neither in the loss nor in metrics, such as a logo or a "
+      "date: "
+      "left, top, right and bottom of each, in shares of width and height from the top left",
+      [&options](const OptionTable::Values& values) {
+        const std::vector<std::string> parts = option_items("ignore-areas", values);
+        if (parts.size() % kNumbers != 0) {
+          throw UsageError(
+              fmt::format("The option 'ignore-areas' has 4 numbers for each box (left, top, right, "
+                          "bottom), not {} in all",
+                          parts.size()));
+        }
+        const auto share = [&](std::size_t i) {
+          return option_number<double>("ignore-areas", parts[i], 0, 1);
+        };
+        std::vector<PhotoArea> areas;
+        for (std::size_t i = 0; i < parts.size(); i += kNumbers)
+          areas.push_back({share(i), share(i + 1), share(i + 2), share(i + 3)});
+        io::check_areas(areas);
+        options.ignore_areas = std::move(areas);
+      },
+      [&options] {
+        std::vector<double> numbers;
+        for (const PhotoArea& area : options.ignore_areas)
+          numbers.insert(numbers.end(), {area.left, area.top, area.right, area.bottom});
+        return fmt::format("[{}]", fmt::join(numbers, ", "));
+      });
+}
+
 void add_origin_option(OptionTable& table, DatasetOptions& options) {
   table.add(
       "origin",
@@ -136,6 +170,7 @@ void add_data_options(OptionTable& table, DatasetOptions& options) {
       "black borders that all photos have, as the bars of a video or around the circle of a "
       "fisheye: auto (they count neither in the loss nor in metrics) or keep (they are a part of "
       "the scene)");
+  add_ignore_areas_option(table, options);
   add_origin_option(table, options);
 }
 

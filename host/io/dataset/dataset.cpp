@@ -110,6 +110,7 @@ Dataset io::load_sized_dataset(const fs::path& path,
         fmt::format("The test interval is {}: it must be 0 or more", options.test_every));
   }
   check_origin(options.origin);
+  check_areas(options.ignore_areas);
   const fs::path root = is_transforms(path) ? fs::absolute(path).parent_path() : path;
   if (!is_folder(root)) {
     throw DataError(fmt::format("The data set {} {}: give the folder of a data set", root.string(),

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "io/dataset/dataset_photos.hpp"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <vector>
 
 #include "io/dataset/photo_views.hpp"
 #include "io/image/color_profiles.hpp"
@@ -11,6 +13,7 @@
 #include "io/photo/photo_border.hpp"
 #include "io/photo/photo_mask.hpp"
 #include "io/photo/photo_transparency.hpp"
+#include "raysplats/error.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -62,6 +65,17 @@ void leave_out_borders(Dataset& dataset) {
       std::count_if(dataset.views.begin(), dataset.views.end(), has_border), dataset.views.size());
 }
 
+void leave_out_areas(Dataset& dataset, const std::vector<PhotoArea>& areas) {
+  if (areas.empty()) return;
+  if (dataset.alpha_is_background) {
+    throw UsageError(
+        "The option 'ignore-areas' is for photos that show a scene all over, but these are cut "
+        "out: "
+        "make what is in the areas transparent, or leave it out by masks");
+  }
+  for (View& view : dataset.views) view.ignored = areas;
+}
+
 /// Whether there may be pixels of a view of which its photo tells nothing: what is transparent, or
 /// what the lens does not reach.
 bool may_have_gaps(const View& view) {
@@ -71,6 +85,18 @@ bool may_have_gaps(const View& view) {
 }
 
 }  // namespace
+
+void check_areas(std::span<const PhotoArea> areas) {
+  for (const PhotoArea& area : areas) {
+    if (area.left >= 0 && area.left < area.right && area.right <= 1 && area.top >= 0 &&
+        area.top < area.bottom && area.bottom <= 1)
+      continue;
+    throw UsageError(fmt::format(
+        "The area {}, {}, {}, {} of photos is no box: left, top, right and bottom are shares of "
+        "width and height from 0 to 1, right above left and bottom above top",
+        area.left, area.top, area.right, area.bottom));
+  }
+}
 
 void look_at_photos(Dataset& dataset, const DatasetOptions& options) {
   warn_of_color_profiles(dataset.views);
@@ -98,6 +124,7 @@ void look_at_photos(Dataset& dataset, const DatasetOptions& options) {
   }
   if (options.borders == BorderUse::kAuto && !dataset.alpha_is_background)
     leave_out_borders(dataset);
+  leave_out_areas(dataset, options.ignore_areas);
 }
 
 }  // namespace raysplats::io

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <glm/ext/vector_int2.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <numbers>
@@ -118,6 +119,38 @@ class BorderedRows : public PhotoPixels {
  private:
   std::unique_ptr<PhotoPixels> source_;
   std::shared_ptr<const PhotoBorder> border_;
+};
+
+class RowsWithoutAreas : public PhotoPixels {
+ public:
+  RowsWithoutAreas(std::unique_ptr<PhotoPixels> source, std::span<const PhotoArea> areas)
+      : PhotoPixels(source->width(), source->height()), source_(std::move(source)) {
+    for (const PhotoArea& area : areas) {
+      boxes_.push_back({{std::floor(area.left * width()), std::floor(area.top * height())},
+                        {std::ceil(area.right * width()), std::ceil(area.bottom * height())}});
+    }
+  }
+
+  void pixel(int x, int y, float* rgba) override {
+    source_->pixel(x, y, rgba);
+    for (const auto& [low, high] : boxes_) {
+      if (x >= low.x && x < high.x && y >= low.y && y < high.y) rgba[3] = 0.0f;
+    }
+  }
+  void row(int y, float* rgba) override {
+    source_->row(y, rgba);
+    for (const auto& [low, high] : boxes_) {
+      if (y < low.y || y >= high.y) continue;
+      for (int x = low.x; x < high.x; ++x) rgba[4 * x + 3] = 0.0f;
+    }
+  }
+
+ private:
+  struct Box {
+    glm::ivec2 low, high;  // first pixel, and the one behind the last
+  };
+  std::unique_ptr<PhotoPixels> source_;
+  std::vector<Box> boxes_;
 };
 
 class MaskRows : public PhotoPixels {
@@ -394,6 +427,11 @@ std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image,
 std::unique_ptr<PhotoPixels> bordered_rows(std::unique_ptr<PhotoPixels> source,
                                            std::shared_ptr<const PhotoBorder> border) {
   return std::make_unique<BorderedRows>(std::move(source), std::move(border));
+}
+
+std::unique_ptr<PhotoPixels> rows_without(std::unique_ptr<PhotoPixels> source,
+                                          std::span<const PhotoArea> areas) {
+  return std::make_unique<RowsWithoutAreas>(std::move(source), areas);
 }
 
 std::unique_ptr<PhotoPixels> mask_rows(const MaskPlane& mask, int width, int height) {

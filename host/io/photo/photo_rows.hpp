@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "io/image/image_codec.hpp"
@@ -61,6 +62,9 @@ std::unique_ptr<PhotoPixels> decoded_rows(const RawImage& image,
 /// Alpha 0 in the border.
 std::unique_ptr<PhotoPixels> bordered_rows(std::unique_ptr<PhotoPixels> source,
                                            std::shared_ptr<const PhotoBorder> border);
+/// Alpha 0 in the areas.
+std::unique_ptr<PhotoPixels> rows_without(std::unique_ptr<PhotoPixels> source,
+                                          std::span<const PhotoArea> areas);
 /// White whose alpha is the mask, at the size of a photo.
 std::unique_ptr<PhotoPixels> mask_rows(const MaskPlane& mask, int width, int height);
 

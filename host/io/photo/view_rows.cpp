@@ -50,9 +50,11 @@ ViewRows::ViewRows(const View& view) {
   const bool bordered = has_border(raw_, view);
   const auto pixels = [&](const MaskPlane* mask) {
     auto decoded = decoded_rows(raw_, mask, colors);
-    return bordered ? bordered_rows(std::move(decoded), view.border) : std::move(decoded);
+    if (bordered) decoded = bordered_rows(std::move(decoded), view.border);
+    return view.ignored.empty() ? std::move(decoded)
+                                : rows_without(std::move(decoded), view.ignored);
   };
-  if (bordered || view.mask_apart) unchanged_ = false;
+  if (bordered || view.mask_apart || !view.ignored.empty()) unchanged_ = false;
   rows_ = fitted(pixels(masked ? &mask_ : nullptr), view);
   if (!view.mask_apart) return;
   // Beside a mask that says what is background, what the photo itself shows is all that counts.

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <map>
 #include <optional>
@@ -35,6 +36,8 @@ constexpr double kMostArea = 0.05;     // of the photo
 constexpr double kNearPlace = 0.015;
 constexpr double kSeenThere = 0.5;
 constexpr std::size_t kDepths = 200;
+constexpr double kRim = 2;  // pixels around a mark, whose edges are the clearest of it alone
+constexpr int kSteps = 8;   // places along a side
 constexpr double kNearest = 0.01, kFarthest = 1e4;
 
 struct Edge {
@@ -182,6 +185,29 @@ std::vector<SmallPhoto> of_one_size(std::span<const SmallPhoto> photos) {
 }
 
 }  // namespace
+
+PhotoArea area_of(const StillMark& mark, const Camera& picture, const Camera& photo) {
+  const glm::dvec2 low = glm::dvec2(mark.low) - kRim, high = glm::dvec2(mark.high + 1) + kRim;
+  const glm::dvec2 size(photo.width, photo.height);
+  glm::dvec2 least(1.0), most(0.0);
+  // A lens bends the sides of the box.
+  for (int i = 0; i <= kSteps; ++i) {
+    for (int j = 0; j <= kSteps; ++j) {
+      const glm::dvec2 place = glm::mix(low, high, glm::dvec2(i, j) / double{kSteps});
+      const CameraRay ray = camera_ray(picture, place.x, place.y);
+      if (!ray.valid) continue;
+      const auto seen = project(photo, ray.origin + ray.direction);
+      if (!seen) continue;
+      least = glm::min(least, *seen / size);
+      most = glm::max(most, *seen / size);
+    }
+  }
+  if (!(least.x < most.x && least.y < most.y)) return {};
+  constexpr double kParts = 1000, kRounding = 1e-6;
+  least = glm::floor(glm::clamp(least, 0.0, 1.0) * kParts + kRounding) / kParts;
+  most = glm::ceil(glm::clamp(most, 0.0, 1.0) * kParts - kRounding) / kParts;
+  return {least.x, least.y, most.x, most.y};
+}
 
 std::vector<StillMark> still_marks(std::span<const SmallPhoto> all) {
   const std::vector<SmallPhoto> photos = of_one_size(all);

@@ -118,3 +118,33 @@ TEST_CASE("a ground that stays where it is behind a turntable is no small mark")
           return y < 120 ? glm::dvec4(1, 1, 1, 1) : pattern(ray, x, y);
         }).empty());
 }
+
+TEST_CASE("the area of a mark is that of the photo, whose lens may bend it") {
+  const StillMark mark{{300, 270}, {359, 281}, 80, {kWidth, kHeight}};
+  Camera picture = around(1).front();
+  const PhotoArea same = area_of(mark, picture, picture);
+  CHECK(same.left == doctest::Approx(298.0 / kWidth).epsilon(0.003));
+  CHECK(same.right == doctest::Approx(362.0 / kWidth).epsilon(0.003));
+  CHECK(same.top == doctest::Approx(268.0 / kHeight).epsilon(0.003));
+  CHECK(same.bottom == doctest::Approx(284.0 / kHeight).epsilon(0.003));
+  // A photo of twice the size through a lens that pulls its corners in.
+  Camera photo = picture;
+  photo.width *= 2, photo.height *= 2;
+  photo.fx *= 2, photo.fy *= 2, photo.cx *= 2, photo.cy *= 2;
+  photo.model = CameraModel::kOpenCv;
+  photo.distortion.k1 = -0.2;
+  const PhotoArea bent = area_of(mark, picture, photo);
+  CHECK(bent.right < same.right);
+  CHECK(bent.bottom < same.bottom);
+  for (const double x : {298.0, 330.0, 362.0}) {
+    for (const double y : {268.0, 276.0, 284.0}) {
+      const CameraRay ray = camera_ray(picture, x, y);
+      const auto seen = project(photo, ray.origin + ray.direction);
+      REQUIRE(seen.has_value());
+      CHECK(seen->x >= bent.left * photo.width - 1e-9);
+      CHECK(seen->x <= bent.right * photo.width + 1e-9);
+      CHECK(seen->y >= bent.top * photo.height - 1e-9);
+      CHECK(seen->y <= bent.bottom * photo.height + 1e-9);
+    }
+  }
+}
