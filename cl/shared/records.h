@@ -66,8 +66,9 @@
     FIELD(RsWave, strength) FIELD(RsWave, bias) FIELD(RsWave, lights) \
     FIELD(RsWave, light_samples) FIELD(RsWave, first_pixel) \
   RECORD(RsAdam) FIELD(RsAdam, beta1) FIELD(RsAdam, rest1) FIELD(RsAdam, beta2) \
-    FIELD(RsAdam, rest2) FIELD(RsAdam, epsilon) FIELD(RsAdam, root_scale) FIELD(RsAdam, rate) \
-    FIELD(RsAdam, rest_rate) \
+    FIELD(RsAdam, rest2) FIELD(RsAdam, epsilon) FIELD(RsAdam, root_scale) FIELD(RsAdam, rates) \
+    FIELD(RsAdam, begin) FIELD(RsAdam, end) FIELD(RsAdam, rows) FIELD(RsAdam, padding) \
+  RECORD(RsParts) FIELD(RsParts, first) \
   RECORD(RsLoss) FIELD(RsLoss, width) FIELD(RsLoss, height) FIELD(RsLoss, stride) \
     FIELD(RsLoss, plane) FIELD(RsLoss, planes) FIELD(RsLoss, composite) FIELD(RsLoss, red) \
     FIELD(RsLoss, green) FIELD(RsLoss, blue) FIELD(RsLoss, pixel_scale) FIELD(RsLoss, ssim_scale) \

@@ -29,15 +29,30 @@
 // In place of the row that a row of a new set comes from: it is new.
 #define RS_NO_SOURCE 0xffffffffu
 
-// One step of Adam for one group of parameters.
+// Groups of parameters of a model: means, quaternions, scales, opacities, SH coefficients.
+#define RS_PARAMETER_GROUPS 5
+#define RS_SH_GROUP 4
+
+// A launch over all groups of parameters: the first of its work-groups that belongs to each, and
+// behind them their number.
+typedef struct {
+  rs_uint first[RS_PARAMETER_GROUPS + 1];
+} RsParts;
+RS_STATIC_ASSERT_SIZE(RsParts, 24);
+
+// One step of Adam.
 typedef struct {
   rs_float beta1, rest1;  // rest = 1 - beta
   rs_float beta2, rest2;
   rs_float epsilon;
-  rs_float root_scale;       // 1 / sqrt(1 - beta2^step)
-  rs_float rate, rest_rate;  // over 1 - beta1^step; of SH the first coefficient's and the others'
+  rs_float root_scale;  // 1 / sqrt(1 - beta2^step)
+  // Over 1 - beta1^step, of each group; of SH the first coefficient's, and behind it the others'.
+  rs_float rates[RS_PARAMETER_GROUPS + 1];
+  rs_uint begin, end;  // Gaussians of the launch
+  rs_uint rows;        // that the buffers of moments have room for
+  rs_uint padding;
 } RsAdam;
-RS_STATIC_ASSERT_SIZE(RsAdam, 32);
+RS_STATIC_ASSERT_SIZE(RsAdam, 64);
 
 // An image x, the photo y that the loss compares it with, and what the loss makes of both.
 typedef struct {

@@ -1,28 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // Adam (Kingma and Ba 2015) for the parameters of the Gaussians: first which of them take the step,
-// then one group of parameters after the other; and the moves of its moments.
+// then all groups of parameters; and the moves of its moments. The first moments of all groups lie
+// in one buffer, each with room for `rows` Gaussians, and so do the second.
 //
 // A Gaussian with a gradient that is not finite keeps its parameters and moments and is counted;
 // with visible_only so does, uncounted, one that no ray met (screen[3 i + 2] == 0). A guard word
 // that is not 0 turns the whole step off (train/step_guard.cl).
 #include "parallel/vector_lanes.h"
-#include "shared/train_layout.h"
+#include "train/parameter_groups.h"
 
-// Gaussians of a work-group of choose_steps.
+// Gaussians of a work-group of choose_steps, and on CPUs of adam_step.
 #ifndef BLOCK
 #define BLOCK 64
 #endif
-// Work-items of a group.
+// Work-items of a group: 1 on CPUs.
 #ifndef GROUP
 #define GROUP 1
-#endif
-// Floats of one Gaussian in the group of parameters, and those that a work-item of adam_step
-// updates: many on CPUs; one vector on GPUs, so that neighbours touch neighbouring addresses.
-#ifndef WIDTH
-#define WIDTH 1
-#endif
-#ifndef SPAN
-#define SPAN LANES
 #endif
 
 // Exponent of infinity and NaN. Compilers may take zero times anything for zero, so numbers that
@@ -86,19 +79,20 @@ __kernel void choose_steps(const __global float* means,
   }
 }
 
-// The learning rates of the floats from `phase` of a Gaussian on: of SH the first three have their
-// own.
-fv step_rates(int phase, const RsAdam* adam) {
-#if WIDTH <= 4
-  (void)phase;
-  return (fv)(adam->rate);
-#else
+// Learning rates of a group of parameters.
+typedef struct {
+  float first, others;
+  bool mixed;  // the first three floats of a Gaussian have their own, as of SH; else all have
+} Rates;
+
+// Those of the floats from `phase` of a Gaussian on.
+fv step_rates(int phase, const Rates* rates) {
+  if (!rates->mixed) return (fv)(rates->first);
   iv place = phase + RS_LANE_INDEX;
-  for (int k = 0; k < (LANES + WIDTH - 2) / WIDTH; ++k) {
-    place = place >= WIDTH ? place - WIDTH : place;
+  for (int k = 0; k < (LANES + SH_FLOATS - 2) / SH_FLOATS; ++k) {
+    place = place >= SH_FLOATS ? place - SH_FLOATS : place;
   }
-  return rs_pick(place < 3, adam->rate, adam->rest_rate);
-#endif
+  return rs_pick(place < 3, rates->first, rates->others);
 }
 
 #define RS_ADAM_UPDATE(T, load, store, pick, rates)                                     \
@@ -121,59 +115,105 @@ void adam_run(__global float* parameter,
               __global float* second,
               size_t begin,
               size_t end,
+              int phase,
+              const Rates* rates,
               const RsAdam* adam) {
-  int phase = (int)(begin % WIDTH);
   size_t i = begin;
   for (; i + LANES <= end; i += LANES) {
-    const fv rates = step_rates(phase, adam);
-    RS_ADAM_UPDATE(fv, rs_load, rs_store, rs_pick, rates);
-    phase = (phase + LANES) % WIDTH;
+    const fv rate = step_rates(phase, rates);
+    RS_ADAM_UPDATE(fv, rs_load, rs_store, rs_pick, rate);
+    phase = (phase + LANES) % SH_FLOATS;
   }
   for (; i < end; ++i) {
-    const float rate = WIDTH <= 4 || phase < 3 ? adam->rate : adam->rest_rate;
+    const float rate = !rates->mixed || phase < 3 ? rates->first : rates->others;
     RS_ADAM_UPDATE(float, rs_load_one, rs_store_one, rs_pick_one, rate);
-    phase = phase + 1 == WIDTH ? 0 : phase + 1;
+    phase = phase + 1 == SH_FLOATS ? 0 : phase + 1;
   }
 }
 
-// One group of parameters of `count` Gaussians. Launch: a work-item for every SPAN floats, any
-// work-group size. Complexity: reads parameter, gradient and both moments once, writes all but the
-// gradient: bound by memory.
-__kernel void adam_step(__global float* parameter,
-                        const __global float* gradient,
-                        __global float* first,
-                        __global float* second,
-                        const __global uchar* steps,
-                        uint count,
-                        RsAdam adam) {
-  const size_t begin = get_global_id(0) * SPAN;
-  const size_t end = min(begin + SPAN, (size_t)count * WIDTH);
-  if (begin >= end) return;
-  const size_t lowest = begin / WIDTH, highest = (end - 1) / WIDTH;
+// At most `floats` floats from number `begin` on, up to `limit`, of a group of parameters that has
+// `width` of them a Gaussian.
+void adam_span(__global float* parameter,
+               const __global float* gradient,
+               __global float* first,
+               __global float* second,
+               const __global uchar* steps,
+               uint width,
+               size_t begin,
+               size_t floats,
+               size_t limit,
+               const Rates rates,
+               const RsAdam* adam) {
+  if (begin >= limit) return;
+  // Compilers do not see that one float is never too many.
+  const size_t end = floats == 1 ? begin + 1 : min(begin + floats, limit);
+  const size_t lowest = begin / width, highest = (end - 1) / width;
   uint all = 1;
   for (size_t i = lowest; i <= highest; ++i) all &= steps[i];
   if (all) {
-    adam_run(parameter, gradient, first, second, begin, end, &adam);
+    const int phase = (int)(begin - lowest * width);
+    adam_run(parameter, gradient, first, second, begin, end, phase, &rates, adam);
     return;
   }
   for (size_t i = lowest; i <= highest; ++i) {
     if (!steps[i]) continue;
-    adam_run(parameter, gradient, first, second, max(begin, i * WIDTH), min(end, (i + 1) * WIDTH),
-             &adam);
+    const size_t from = max(begin, i * width), to = min(end, (i + 1) * width);
+    const int phase = (int)(from - i * width);
+    adam_run(parameter, gradient, first, second, from, to, phase, &rates, adam);
   }
 }
 
+// A step of all groups of parameters of the Gaussians [begin, end). Launch: groups of GROUP
+// work-items as `parts` says: on CPUs a work-item for every BLOCK Gaussians; elsewhere one for
+// every LANES floats, so that neighbours touch neighbouring addresses. Complexity: reads
+// parameters, gradients and both moments once, writes all but the gradients: bound by memory.
+__kernel void adam_step(__global float* means,
+                        __global float* quaternions,
+                        __global float* scales,
+                        __global float* opacities,
+                        __global float* sh,
+                        const __global float* g_means,
+                        const __global float* g_quaternions,
+                        const __global float* g_scales,
+                        const __global float* g_opacities,
+                        const __global float* g_sh,
+                        __global float* first,
+                        __global float* second,
+                        const __global uchar* steps,
+                        const RsParts parts,
+                        const RsAdam adam) {
+#if GROUP == 1
+#define RS_FLOATS(width) (BLOCK * (width))
+#else
+#define RS_FLOATS(width) LANES
+#endif
+#define RS_STEP(number, name, width, place)                                                     \
+  if (rs_works_on(parts, number)) {                                                             \
+    const Rates rates = {adam.rates[number], adam.rates[RS_PARAMETER_GROUPS],                   \
+                         number == RS_SH_GROUP && width > 3};                                   \
+    const size_t row = (size_t)place * adam.rows;                                               \
+    const size_t begin =                                                                        \
+        adam.begin * (size_t)width + rs_item_of(parts, number) * RS_FLOATS(width);              \
+    adam_span(name, g_##name, first + row, second + row, steps, width, begin, RS_FLOATS(width), \
+              adam.end * (size_t)width, rates, &adam);                                          \
+  }
+  RS_EACH_PARAMETER_GROUP(RS_STEP)
+}
+
 // Row i of `to`, `width` floats, becomes row source[i] of `from`, or zeros where source[i] is
-// RS_NO_SOURCE. Launch: a work-item for every `span` floats of the new rows, which are in one row.
+// RS_NO_SOURCE. The rows begin behind so many floats of either. Launch: a work-item for every
+// `span` floats of the new rows, which are in one row.
 __kernel void remap_rows(const __global float* from,
                          __global float* to,
                          const __global uint* source,
+                         ulong from_begin,
+                         ulong to_begin,
                          uint width,
                          uint span,
                          uint count) {
   const size_t first = get_global_id(0) * (size_t)span;
   if (first >= (size_t)count * width) return;
   const uint old = source[first / width];
-  const __global float* row = from + (size_t)old * width + first % width;
-  for (uint k = 0; k < span; ++k) to[first + k] = old == RS_NO_SOURCE ? 0.0f : row[k];
+  const __global float* row = from + from_begin + (size_t)old * width + first % width;
+  for (uint k = 0; k < span; ++k) to[to_begin + first + k] = old == RS_NO_SOURCE ? 0.0f : row[k];
 }

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts the numbers of a Gaussian-major array that are NaN or infinite, and finds the first
-// Gaussian that has one. Bits are looked at instead of values, which compilers may assume to be
-// finite.
+// Counts the numbers of a Gaussian-major array, from word `place` of a buffer on, that are NaN or
+// infinite, and finds the first Gaussian that has one. Bits are looked at instead of values, which
+// compilers may assume to be finite.
 //
 // Launch: work-items of `chunk` consecutive Gaussians of `width` numbers each; O(count width).
 // found = {how many numbers, index of the first Gaussian}, {0, 0xffffffff} before the launch;
 // integer atomics only where there is something to report, so that scheduling changes nothing.
 __kernel void find_non_finite(__global const uint* restrict words,
                               __global uint* found,
+                              const ulong place,
                               const uint count,
                               const uint width,
                               const uint chunk) {
@@ -16,7 +17,7 @@ __kernel void find_non_finite(__global const uint* restrict words,
   uint bad = 0, first = 0xffffffffu;
   for (uint i = begin; i < end; ++i) {
     for (uint k = 0; k < width; ++k) {
-      if ((words[i * (size_t)width + k] & 0x7f800000u) != 0x7f800000u) continue;
+      if ((words[place + i * (size_t)width + k] & 0x7f800000u) != 0x7f800000u) continue;
       ++bad;
       first = min(first, i);
     }

@@ -209,7 +209,7 @@ KernelWork adam_work(const ExecutedCounts& c) {
                                    : KernelWork{.vectors = 1.35, .scalars = 0.6, .slow = 0.125};
   KernelWork out =
       times(parameters, parameter) + moved(RS_WORK_ADAM_BYTES * parameters, 20 * parameters);
-  out.launches = out.shared = 6;
+  out.launches = out.shared = 2;
   return out;
 }
 

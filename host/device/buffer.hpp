@@ -94,10 +94,10 @@ class Buffer {
   }
   /// Sets every 32-bit word of all elements to zero.
   void clear() { clear(size_); }
-  /// Sets the first `count` elements to zero.
-  void clear(std::size_t count) {
+  /// Sets `count` elements from number `first` on to zero.
+  void clear(std::size_t count, std::size_t first = 0) {
     static_assert(sizeof(T) % 4 == 0);
-    if (count > 0) raw_.fill(0, count * sizeof(T), 0);
+    if (count > 0) raw_.fill(0, count * sizeof(T), first * sizeof(T));
   }
   /// Sets every 32-bit word of all elements to `word`.
   void fill(std::uint32_t word) {

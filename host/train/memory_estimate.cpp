@@ -145,7 +145,8 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
   if (options.depth_weight > 0)
     out.images += demand.pixels * (4 + (demand.depth_maps > 0 ? 1 : 0)) * sizeof(float);
   if (packets) out.hits = packet_bytes(options, demand, device);
-  std::size_t largest = std::max({sh * sizeof(float), sizeof(RsLine), packets ? exact : 0});
+  // Moments of all parameters lie in one buffer.
+  std::size_t largest = std::max({floats * sizeof(float), sizeof(RsLine), packets ? exact : 0});
   if (demand.ray_views > 0) {
     const RayShare share = rays_per_gaussian(options, demand.gaussians, device);
     out.rays = demand.gaussians * share.bytes + ray_bytes(options, demand.pixels, device) +

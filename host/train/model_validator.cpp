@@ -25,15 +25,11 @@ ModelValidator::ModelValidator(Context& context, const TraceOptions& options)
       tree_(context, options, 0),
       found_(context, 2, "validation") {}
 
-std::string ModelValidator::find_non_finite(const Buffer<float>& values,
-                                            const std::string& name,
-                                            std::size_t width) {
-  if (values.size() == 0) return "";
+std::string ModelValidator::find_non_finite(const Numbers& numbers, const std::string& name) {
   found_.upload(std::array<std::uint32_t, 2>{0, 0xffffffffu});
-  const std::size_t count = values.size() / width;
-  kernel_.launch(Range::linear((count + chunk_ - 1) / chunk_, kGroupSize),
-                 BufferAs<std::uint32_t>{values.raw()}, found_, static_cast<std::uint32_t>(count),
-                 static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(chunk_));
+  kernel_.launch(Range::linear((numbers.count + chunk_ - 1) / chunk_, kGroupSize),
+                 BufferAs<std::uint32_t>{numbers.buffer->raw()}, found_,
+                 std::uint64_t{numbers.first}, u32(numbers.count), u32(numbers.width), u32(chunk_));
   const std::vector<std::uint32_t> found = found_.download();
   if (found[0] == 0) return "";
   return fmt::format("{} numbers of '{}' are not finite, the first of them in Gaussian {}",
@@ -47,11 +43,13 @@ std::string ModelValidator::find_fault(const DeviceGaussians& gaussians,
   for (const ParameterGroup group : kParameterGroups) {
     const std::string name = group_name(group);
     const std::size_t width = group_width(group, gaussians.sh_degree);
-    for (const auto& [values, what] :
-         {std::pair(&gaussians[group], name),
-          std::pair(&adam.first_moment(group), "first moments of " + name),
-          std::pair(&adam.second_moment(group), "second moments of " + name)}) {
-      std::string fault = find_non_finite(*values, what, width);
+    std::string fault = find_non_finite({&gaussians[group], 0, gaussians.count, width}, name);
+    if (!fault.empty()) return fault;
+    for (const auto& [moments, what] : {std::pair(&adam.first_moments(), "first moments of "),
+                                        std::pair(&adam.second_moments(), "second moments of ")}) {
+      if (moments->size() == 0) continue;
+      fault =
+          find_non_finite({moments, adam.moment_place(group), gaussians.count, width}, what + name);
       if (!fault.empty()) return fault;
     }
   }

@@ -29,9 +29,12 @@ class ModelValidator {
                          RayTracer* rays = nullptr);
 
  private:
-  std::string find_non_finite(const Buffer<float>& values,
-                              const std::string& name,
-                              std::size_t width);
+  // `width` numbers of each of `count` Gaussians, from number `first` of a buffer on.
+  struct Numbers {
+    const Buffer<float>* buffer;
+    std::size_t first, count, width;
+  };
+  std::string find_non_finite(const Numbers& numbers, const std::string& name);
 
   Context& context_;
   std::size_t chunk_;  // Gaussians per work-item

@@ -49,8 +49,8 @@ CheckpointSections store_state(const DeviceGaussians& gaussians,
   for (const ParameterGroup group : kParameterGroups) {
     const std::string name = group_name(group);
     add(name, gaussians[group]);
-    add(name + ".first", adam.first_moment(group));
-    add(name + ".second", adam.second_moment(group));
+    out[name + ".first"] = [&adam, group] { return adam.first_moments(group); };
+    out[name + ".second"] = [&adam, group] { return adam.second_moments(group); };
   }
   add("density", density.statistics());
   return out;

@@ -9,6 +9,7 @@
 
 #include "device/kernel.hpp"
 #include "raysplats/error.hpp"
+#include "train/optimizer/group_parts.hpp"
 #include "train/optimizer/lanes.hpp"
 
 namespace raysplats {
@@ -20,6 +21,31 @@ constexpr char kProgram[] = "train/adam.cl";
 constexpr std::size_t kBlock = 256;
 constexpr std::size_t kGroup = 64;
 constexpr std::size_t kCachedFloats = std::size_t{1} << 20;
+// Groups of parameters begin at lines of 64 bytes.
+constexpr std::size_t kLineFloats = 16;
+
+// Gaussians that moments have room for.
+std::size_t moment_rows(std::size_t count) {
+  return (count + kLineFloats - 1) / kLineFloats * kLineFloats;
+}
+
+// Floats of one Gaussian in the groups before this one.
+std::size_t floats_before(ParameterGroup group, int sh_degree) {
+  std::size_t floats = 0;
+  for (const ParameterGroup other : kParameterGroups) {
+    if (other < group) floats += group_width(other, sh_degree);
+  }
+  return floats;
+}
+
+std::size_t gaussian_floats(int sh_degree) {
+  return floats_before(ParameterGroup::kSh, sh_degree) +
+         group_width(ParameterGroup::kSh, sh_degree);
+}
+
+std::size_t moment_floats(std::size_t count, int sh_degree) {
+  return moment_rows(count) * gaussian_floats(sh_degree);
+}
 
 }  // namespace
 
@@ -44,24 +70,22 @@ Adam::Adam(Context& context, const AdamOptions& options, int vector)
   open_guard_.clear();
 }
 
-// A work-item takes the floats of a block of Gaussians on CPUs, elsewhere one vector.
-Kernel Adam::step_kernel(ParameterGroup group, int sh_degree) const {
-  const std::size_t width = group_width(group, sh_degree);
+Kernel Adam::step_kernel(int sh_degree) const {
   BuildOptions build;
   build.define("LANES", lanes_)
-      .define("WIDTH", width)
-      .define("SPAN", cpu_ ? kBlock * width : static_cast<std::size_t>(lanes_));
+      .define("BLOCK", kBlock)
+      .define("GROUP", cpu_ ? 1 : kGroup)
+      .define("SH_FLOATS", group_width(ParameterGroup::kSh, sh_degree));
   return context_.kernel(kProgram, "adam_step", build);
 }
 
-void Adam::begin_programs(int sh_degree) {
-  for (const ParameterGroup group : kParameterGroups) step_kernel(group, sh_degree);
-}
+void Adam::begin_programs(int sh_degree) { step_kernel(sh_degree); }
 
 void Adam::initialize(std::size_t count, int sh_degree) {
-  first_.ensure(context_, count, sh_degree, "Adam first moments");
-  second_.ensure(context_, count, sh_degree, "Adam second moments");
-  for (const ParameterGroup group : kParameterGroups) reset(group);
+  first_.ensure(context_, moment_floats(count, sh_degree), "Adam first moments");
+  second_.ensure(context_, moment_floats(count, sh_degree), "Adam second moments");
+  first_.clear();
+  second_.clear();
   skipped_.clear();
   initialized_ = true;
   count_ = count;
@@ -92,11 +116,16 @@ void Adam::step(DeviceGaussians& gaussians,
   record.rest2 = static_cast<float>(1.0 - options_.beta2);
   record.epsilon = static_cast<float>(options_.epsilon);
   record.root_scale = static_cast<float>(1.0 / std::sqrt(bias2));
+  const double of_groups[RS_PARAMETER_GROUPS + 1] = {
+      rates.means, rates.quaternions, rates.scales, rates.opacities, rates.sh_dc, rates.sh_rest};
+  std::transform(std::begin(of_groups), std::end(of_groups), std::begin(record.rates),
+                 [bias1](double rate) { return static_cast<float>(rate / bias1); });
+  record.rows = u32(moment_rows(count_));
 
   chosen_.ensure(context_, count_, "Gaussians that take the step");
   const std::size_t slice = slice_size();
   for (std::size_t begin = 0; begin < count_; begin += slice) {
-    step_slice(begin, std::min(begin + slice, count_), gaussians, gradients, rates, bias1, record,
+    step_slice(begin, std::min(begin + slice, count_), gaussians, gradients, record,
                guard != nullptr ? *guard : open_guard_);
   }
 }
@@ -105,41 +134,31 @@ void Adam::step(DeviceGaussians& gaussians,
 // cache.
 std::size_t Adam::slice_size() const {
   if (!cpu_) return count_;
-  std::size_t floats = 0;
-  for (const ParameterGroup group : kParameterGroups) floats += group_width(group, sh_degree_);
-  return std::max<std::size_t>(1, kCachedFloats / floats / kBlock) * kBlock;
+  return std::max<std::size_t>(1, kCachedFloats / gaussian_floats(sh_degree_) / kBlock) * kBlock;
 }
 
 void Adam::step_slice(std::size_t begin,
                       std::size_t end,
                       DeviceGaussians& gaussians,
                       const GaussianGradients& gradients,
-                      const AdamRates& rates,
-                      double bias1,
                       RsAdam record,
                       const Buffer<std::uint32_t>& guard) {
   const std::size_t items = cpu_ ? 1 : kGroup;
-  Range blocks = Range::linear((end - begin + kBlock - 1) / kBlock * items, items);
-  blocks.offset[0] = begin / kBlock * items;
-  choose_kernel_.launch(blocks, gradients.means, gradients.quaternions, gradients.scales,
+  const std::size_t blocks = (end - begin + kBlock - 1) / kBlock;
+  Range range = Range::linear(blocks * items, items);
+  range.offset[0] = begin / kBlock * items;
+  choose_kernel_.launch(range, gradients.means, gradients.quaternions, gradients.scales,
                         gradients.opacities, gradients.sh, gradients.screen, guard, u32(end),
                         u32(group_width(ParameterGroup::kSh, sh_degree_)),
                         options_.visible_only ? 1 : 0, chosen_, skipped_);
-  const double group_rates[kParameterGroups.size()] = {rates.means, rates.quaternions, rates.scales,
-                                                       rates.opacities, rates.sh_dc};
-  for_each_group(
-      [&](ParameterGroup group, Buffer<float>& parameter, const Buffer<float>& gradient,
-          Buffer<float>& first, Buffer<float>& second) {
-        const std::size_t width = group_width(group, sh_degree_);
-        const std::size_t span = cpu_ ? kBlock * width : static_cast<std::size_t>(lanes_);
-        record.rate = static_cast<float>(group_rates[static_cast<std::size_t>(group)] / bias1);
-        record.rest_rate = static_cast<float>(rates.sh_rest / bias1);
-        Range range = Range::linear(((end - begin) * width + span - 1) / span, cpu_ ? 1 : kGroup);
-        range.offset[0] = begin * width / span;
-        step_kernel(group, sh_degree_)
-            .launch(range, parameter, gradient, first, second, chosen_, u32(end), record);
-      },
-      gaussians, gradients, first_, second_);
+  record.begin = u32(begin);
+  record.end = u32(end);
+  const GroupParts work =
+      cpu_ ? group_blocks(blocks)
+           : group_parts(end - begin, sh_degree_, kGroup, static_cast<std::size_t>(lanes_));
+  step_kernel(sh_degree_)
+      .launch(work.range, gaussians.arguments(), gradients.Parameters::arguments(), first_, second_,
+              chosen_, work.parts, record);
 }
 
 void Adam::remap(const Buffer<std::uint32_t>& source, std::size_t new_count) {
@@ -147,39 +166,59 @@ void Adam::remap(const Buffer<std::uint32_t>& source, std::size_t new_count) {
     throw UsageError(
         fmt::format("Adam was given {} source indices for {} Gaussians", source.size(), new_count));
   }
-  for (Parameters* moments : {&first_, &second_}) {
-    for_each_group(
-        [&](ParameterGroup group, Buffer<float>& from) {
-          const std::size_t width = group_width(group, sh_degree_);
-          Buffer<float> to(context_, width * new_count, "Adam moments");
-          if (new_count > 0) {
-            // Neighbours of GPUs touch neighbouring addresses.
-            const std::size_t span = cpu_ ? width : 1;
-            remap_kernel_.launch(Range{{new_count * width / span, 1, 1}, {0, 0, 0}}, from, to,
-                                 source, u32(width), u32(span), u32(new_count));
-          }
-          from = std::move(to);
-        },
-        *moments);
+  for (Buffer<float>* moments : {&first_, &second_}) {
+    Buffer<float> moved(context_, moment_floats(new_count, sh_degree_), "Adam moments");
+    for (const ParameterGroup group : kParameterGroups) {
+      const std::size_t width = group_width(group, sh_degree_);
+      const std::size_t before = floats_before(group, sh_degree_);
+      // Neighbours of GPUs touch neighbouring addresses.
+      const std::size_t span = cpu_ ? width : 1;
+      remap_kernel_.launch(Range{{new_count * width / span, 1, 1}, {0, 0, 0}}, *moments, moved,
+                           source, std::uint64_t{before * moment_rows(count_)},
+                           std::uint64_t{before * moment_rows(new_count)}, u32(width), u32(span),
+                           u32(new_count));
+    }
+    *moments = std::move(moved);
   }
   count_ = new_count;
 }
 
+std::size_t Adam::moment_place(ParameterGroup group) const {
+  return floats_before(group, sh_degree_) * moment_rows(count_);
+}
+
+// Of the moments of a group.
+std::size_t Adam::floats(ParameterGroup group) const {
+  return count_ * group_width(group, sh_degree_);
+}
+
+std::vector<float> Adam::first_moments(ParameterGroup group) const {
+  std::vector<float> out(floats(group));
+  first_.download(out, moment_place(group));
+  return out;
+}
+
+std::vector<float> Adam::second_moments(ParameterGroup group) const {
+  std::vector<float> out(floats(group));
+  second_.download(out, moment_place(group));
+  return out;
+}
+
 void Adam::reset(ParameterGroup group) {
-  first_[group].clear();
-  second_[group].clear();
+  for (Buffer<float>* moments : {&first_, &second_})
+    moments->clear(floats(group), moment_place(group));
 }
 
 void Adam::restore(ParameterGroup group,
                    std::span<const float> first,
                    std::span<const float> second) {
-  if (first.size() != first_[group].size() || second.size() != second_[group].size()) {
+  if (first.size() != floats(group) || second.size() != floats(group)) {
     throw UsageError(
         fmt::format("The {} moments given to Adam have {} and {} values, {} are expected",
-                    group_name(group), first.size(), second.size(), first_[group].size()));
+                    group_name(group), first.size(), second.size(), floats(group)));
   }
-  first_[group].upload(first);
-  second_[group].upload(second);
+  first_.upload(first, moment_place(group));
+  second_.upload(second, moment_place(group));
 }
 
 }  // namespace raysplats

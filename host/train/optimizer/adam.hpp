@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
@@ -31,7 +32,7 @@ struct AdamRates {
 };
 
 /// Adam (Kingma and Ba 2015) for the parameters of DeviceGaussians: a launch that chooses which
-/// Gaussians take the step, and one per group of parameters. A Gaussian with any non-finite
+/// Gaussians take the step, and one for all groups of parameters. A Gaussian with any non-finite
 /// gradient is left as it was in that step and counted.
 class Adam {
  public:
@@ -63,9 +64,14 @@ class Adam {
   std::int64_t steps() const { return steps_; }
   void set_steps(std::int64_t steps) { steps_ = steps; }
 
-  /// Moments, laid out as the parameters. Empty before initialize().
-  const Buffer<float>& first_moment(ParameterGroup group) const { return first_[group]; }
-  const Buffer<float>& second_moment(ParameterGroup group) const { return second_[group]; }
+  /// Moments of all groups, one after the other, each laid out as the parameters and from
+  /// moment_place() on. Empty before initialize().
+  const Buffer<float>& first_moments() const { return first_; }
+  const Buffer<float>& second_moments() const { return second_; }
+  std::size_t moment_place(ParameterGroup group) const;
+  /// Those of one group; blocks.
+  std::vector<float> first_moments(ParameterGroup group) const;
+  std::vector<float> second_moments(ParameterGroup group) const;
   /// Uploads both moments of a group; the sizes must be those of initialize().
   void restore(ParameterGroup group, std::span<const float> first, std::span<const float> second);
 
@@ -75,15 +81,14 @@ class Adam {
   std::uint32_t skipped() const { return skipped_.read(0); }
 
  private:
-  Kernel step_kernel(ParameterGroup group, int sh_degree) const;
+  Kernel step_kernel(int sh_degree) const;
+  std::size_t floats(ParameterGroup group) const;
   std::size_t slice_size() const;
   // Makes the step of the Gaussians [begin, end); begin is a multiple of slice_size().
   void step_slice(std::size_t begin,
                   std::size_t end,
                   DeviceGaussians& gaussians,
                   const GaussianGradients& gradients,
-                  const AdamRates& rates,
-                  double bias1,
                   RsAdam record,
                   const Buffer<std::uint32_t>& guard);
 
@@ -95,7 +100,7 @@ class Adam {
   Buffer<std::uint32_t> skipped_;
   Buffer<std::uint32_t> open_guard_;  // a guard that lets every step pass
   Buffer<std::uint8_t> chosen_;       // Gaussians that take the step
-  Parameters first_, second_;         // moments
+  Buffer<float> first_, second_;      // moments
   bool initialized_ = false;
   std::size_t count_ = 0;
   int sh_degree_ = 0;

@@ -26,7 +26,7 @@ constexpr std::size_t kMostArguments = 20;
 
 // A kernel with an argument of every sort.
 const char* const kSorts =
-    "typedef struct { float a; float b[7]; } RsAdam;\n"
+    "typedef struct { float a; float b[15]; } RsAdam;\n"
     "typedef float4 fv;\n"
     "__kernel void sorts(__global fv* vectors, const int number, const uint word,\n"
     "                    const float4 four, const RsAdam record, __global RsAdam* records,\n"
