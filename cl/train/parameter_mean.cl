@@ -3,15 +3,30 @@
 // their best values, the farther the larger the rates, and the mean lies nearer than most of them
 // (Polyak and Juditsky 1992; of networks: Izmailov et al. 2018).
 
-// mean[i] moves by `share` of its way to parameter[i]: 1 / (samples so far, this one included). A
-// guard word that is not 0 turns it off. Launch: a work-item for each of `count` floats, any group
-// size.
+#include "train/parameter_groups.h"
+
+// All means move by `share` of their way to the parameters: 1 / (samples so far, this one
+// included). A guard word that is not 0 turns it off. Launch: a work-item for each float of `count`
+// Gaussians, in groups as `parts` says.
 __kernel void add_sample(uint count,
                          float share,
-                         const __global float* parameter,
+                         const RsParts parts,
                          const __global uint* guard,
-                         __global float* mean) {
-  const size_t i = get_global_id(0);
-  if (i >= count || guard[0] != 0) return;
-  mean[i] += share * (parameter[i] - mean[i]);
+                         const __global float* means,
+                         const __global float* quaternions,
+                         const __global float* scales,
+                         const __global float* opacities,
+                         const __global float* sh,
+                         __global float* mean_means,
+                         __global float* mean_quaternions,
+                         __global float* mean_scales,
+                         __global float* mean_opacities,
+                         __global float* mean_sh) {
+  if (guard[0] != 0) return;
+#define RS_ADD(number, name, width, place)                                               \
+  if (rs_works_on(parts, number)) {                                                      \
+    const size_t i = rs_item_of(parts, number);                                          \
+    if (i < (size_t)count * width) mean_##name[i] += share * (name[i] - mean_##name[i]); \
+  }
+  RS_EACH_PARAMETER_GROUP(RS_ADD)
 }

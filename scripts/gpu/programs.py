@@ -109,7 +109,7 @@ PROGRAMS = [
     ("adam sh0", "train/adam.cl", dict(LANES=1, BLOCK=256, GROUP=64, SH_FLOATS=3)),
     ("densify", "train/density_control.cl", dict(SH_COEFFICIENTS=16, SIGMOID_SCALE=0)),
     ("footprint", "train/footprint.cl", dict(SIGMOID_SCALE=0)),
-    ("parameter mean", "train/parameter_mean.cl", {}),
+    ("parameter mean", "train/parameter_mean.cl", dict(SH_FLOATS=48)),
     ("mcmc", "train/mcmc.cl", dict(SIGMOID_SCALE=0)),
     ("guard", "train/step_guard.cl", {}),
     ("photo fit", "train/photo_fit.cl", {}),

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "train/optimizer/group_parts.hpp"
 #include "train/schedule.hpp"
 
 namespace raysplats {
@@ -44,15 +45,19 @@ bool ParameterMean::add(const TrainOptions& options,
   if (step == 0) shape(gaussians);
   const std::int64_t number = step / every + 1;
   const auto share = static_cast<float>(1.0 / static_cast<double>(number));
-  Kernel kernel = context_.kernel(kProgram, "add_sample");
-  for (const ParameterGroup group : kParameterGroups) {
-    const std::size_t size = gaussians.count * group_width(group, gaussians.sh_degree);
-    if (step == 0) {
-      mean_[group].copy_from(gaussians[group], size);
-    } else {
-      kernel.launch(Range::linear(size, kGroup), static_cast<std::uint32_t>(size), share,
-                    gaussians[group], guard, mean_[group]);
-    }
+  if (step == 0) {
+    for_each_group(
+        [&](ParameterGroup group, Buffer<float>& mean, const Buffer<float>& parameters) {
+          mean.copy_from(parameters, gaussians.count * group_width(group, gaussians.sh_degree));
+        },
+        mean_, gaussians);
+  } else if (gaussians.count > 0) {
+    BuildOptions build;
+    build.define("SH_FLOATS", group_width(ParameterGroup::kSh, gaussians.sh_degree));
+    const GroupParts work = group_parts(gaussians.count, gaussians.sh_degree, kGroup);
+    context_.kernel(kProgram, "add_sample", build)
+        .launch(work.range, u32(gaussians.count), share, work.parts, guard, gaussians.arguments(),
+                mean_.arguments());
   }
   mean_.changed(context_);
   return true;
