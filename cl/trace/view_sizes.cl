@@ -3,7 +3,8 @@
 // does not fit is left out as a whole. A view then shows nothing and has no gradients, and so have
 // all views after it, until the host has seen the word `overflow` and cleared it.
 //   admit_candidates   live[0] = candidates that are listed: all of the view's or, without room,
-//                      none. live[1] = the first step of their depths. One work-item.
+//                      none. live[1] = the first step of their depths. Counts them, in counters of
+//                      which `anew` words begin at zero. One work-item.
 //   check_streams      forgets all hits when their chunks had no room. One work-item per packet.
 #include "bvh/box.h"
 #include "parallel/counter.h"
@@ -48,6 +49,7 @@ __kernel void admit_candidates(__global const uint* offsets,
                                __global const RsAabb* boxes,
                                const RsCamera camera,
                                const uint capacity,
+                               const uint anew,
                                __global uint* live,
                                volatile __global uint* counters,
                                __global uint* overflow) {
@@ -56,6 +58,7 @@ __kernel void admit_candidates(__global const uint* offsets,
   live[0] = overflow[0] == 0 ? wanted : 0;
   const float4 center = (float4)(camera.center[0], camera.center[1], camera.center[2], 0.0f);
   live[1] = first_depth_step(median_of_few(boxes, count, center));
+  for (uint k = 0; k < anew; ++k) counters[k] = 0;
   rs_count(counters + RS_COUNT_CANDIDATES, wanted);
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <utility>
 
 #include "device/fault_injection.hpp"
 #include "scene/options/trace_option_table.hpp"
@@ -20,9 +21,11 @@ void CameraTracer::Impl::trace_ahead(const DeviceGaussians& gaussians) {
   FaultInjection& faults = context.faults();
   room = faults.strikes(Fault::kHits) ? 0 : static_cast<std::uint32_t>(streams.view_room());
   const std::size_t budget = faults.strikes(Fault::kLists) ? 0 : shares.tile_lists();
+  bool anew = true;
   for (const int number : faces()) {
     set_face(gaussians, number);
-    lists.build_ahead(boxes, camera, whole(), budget, counters, overflow);
+    lists.build_ahead(boxes, camera, whole(), budget, std::exchange(anew, false), counters,
+                      overflow);
     launch_forward(whole(), true);
   }
   streams.check(packet_count(), room, counters, overflow);

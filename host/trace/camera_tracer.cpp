@@ -178,11 +178,11 @@ void CameraTracer::forward(const DeviceGaussians& gaussians,
   self.hits_kept = keep_hits;
   self.statistics_saved = false;
   self.watched_tiles = 0;
-  self.counters.clear();
   if (keep_hits && sizes == ViewSizes::kAhead && self.can_trace_ahead()) {
     self.trace_ahead(gaussians);
     return;
   }
+  self.counters.clear();
   if (self.streams.capacity() == 0) self.streams.grow(keep_hits ? 2 * self.packet_count() : 1);
   if (keep_hits) self.traced_whole = true;
   self.trace_faces(gaussians, keep_hits);

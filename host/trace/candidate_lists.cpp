@@ -188,13 +188,15 @@ void CandidateLists::fill(const Buffer<RsAabb>& boxes,
                           const TileWindow& window,
                           std::size_t capacity,
                           std::size_t room,
+                          bool anew,
                           Buffer<std::uint32_t>& counters,
                           Buffer<std::uint32_t>& overflow) {
   const auto tiles = static_cast<std::uint32_t>(window.tiles());
   stride_ = static_cast<std::uint32_t>(room + kBoxPadding);
   admit_kernel_.launch(Range{{1, 1, 1}, {1, 1, 1}, {}}, offsets_,
                        static_cast<std::uint32_t>(count_), boxes, camera,
-                       static_cast<std::uint32_t>(capacity), live_, counters, overflow);
+                       static_cast<std::uint32_t>(capacity), anew ? u32(counters.size()) : 0u,
+                       live_, counters, overflow);
   if (face_.tiles != nullptr) {
     fill_kernel_.launch(count_, bounds_, boxes, lines_, camera, window, offsets_, face_.face,
                         face_.tiles->tiles(), face_.tiles->spans(face_.face), live_, keys_,
@@ -227,7 +229,7 @@ bool CandidateLists::build(const Buffer<RsAabb>& boxes,
     boxes_.ensure(*context_, 4 * (room + kBoxPadding), "candidate boxes");
     capacity_ = room;
   }
-  fill(boxes, camera, window, found, found, counters, fitted_);
+  fill(boxes, camera, window, found, found, false, counters, fitted_);
   return true;
 }
 
@@ -239,11 +241,12 @@ void CandidateLists::build_ahead(const Buffer<RsAabb>& boxes,
                                  const RsCamera& camera,
                                  const TileWindow& window,
                                  std::size_t budget,
+                                 bool anew,
                                  Buffer<std::uint32_t>& counters,
                                  Buffer<std::uint32_t>& overflow) {
   const std::size_t room = std::min(capacity_, allowed(budget));
   count(boxes, camera, window);
-  fill(boxes, camera, window, room, room, counters, overflow);
+  fill(boxes, camera, window, room, room, anew, counters, overflow);
 }
 
 }  // namespace raysplats

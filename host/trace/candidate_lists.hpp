@@ -79,11 +79,13 @@ class CandidateLists {
              std::size_t budget,
              Buffer<std::uint32_t>& counters);
   /// The same without waiting: where there are more candidates than the lists before had room for,
-  /// or the budget allows, the lists are empty and overflow[0] becomes 1.
+  /// or the budget allows, the lists are empty and overflow[0] becomes 1. With `anew` all counters
+  /// begin at zero.
   void build_ahead(const Buffer<RsAabb>& boxes,
                    const RsCamera& camera,
                    const TileWindow& window,
                    std::size_t budget,
+                   bool anew,
                    Buffer<std::uint32_t>& counters,
                    Buffer<std::uint32_t>& overflow);
   /// Whether build_ahead() has any room, and numbers for so many tiles.
@@ -107,6 +109,7 @@ class CandidateLists {
             const TileWindow& window,
             std::size_t capacity,
             std::size_t room,
+            bool anew,
             Buffer<std::uint32_t>& counters,
             Buffer<std::uint32_t>& overflow);
 

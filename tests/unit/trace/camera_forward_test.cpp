@@ -440,8 +440,16 @@ TEST_CASE("lists that 32 bits cannot count are refused before anything is writte
   CHECK(counters.read(RS_COUNT_CANDIDATES) == 6 * kCount);
   Buffer<std::uint32_t> overflow(context, 1, "overflow");
   overflow.clear();
-  lists.build_ahead(boxes, converted, {0, 0, 256, 255}, std::size_t{1} << 30, counters, overflow);
+  const std::size_t budget = std::size_t{1} << 30;
+  lists.build_ahead(boxes, converted, {0, 0, 256, 255}, budget, false, counters, overflow);
   CHECK(overflow.read(0) == 1);
+  CHECK(counters.read(RS_COUNT_CANDIDATES + 1) == 1);  // added to those before
+  overflow.clear();
+  counters.fill(7);
+  lists.build_ahead(boxes, converted, {200, 7, 3, 2}, budget, true, counters, overflow);
+  CHECK(overflow.read(0) == 0);
+  CHECK(counters.read(RS_COUNT_CANDIDATES) == 6 * kCount);
+  CHECK(counters.read(RS_COUNT_CHUNKS) == 0);
 }
 
 TEST_CASE("lists with all the room that the largest buffer gives fit it, padding included") {
