@@ -9,12 +9,14 @@
 // CPUs handle slowly.
 #define RS_TINY_MOMENT 1e-30f
 
-// Words of the state that train/step_guard.cl keeps.
-#define RS_GUARD_WORDS 7
+// Words of the state that train/step_guard.cl keeps, and the place of two of them: rays of the
+// present step that the cap on hits stopped.
+#define RS_GUARD_WORDS 9
+#define RS_GUARD_CAPPED 7
 #define RS_GUARD_POISONED 1u  // bits of its first word
 #define RS_GUARD_REPEATED 2u
 
-// Parts of the sums that train/photo_fit.cl keeps of a photo.
+// Parts of the sums that train/step_guard.cl keeps of a photo.
 #define RS_FIT_ITEMS 64
 
 // What becomes of a Gaussian in the new set of density control; the host's DensityRole tells more.

@@ -103,9 +103,7 @@ struct ViewTracer::Impl {
         background(options_in.background),
         mirrors(std::move(mirrors_in)),
         tree(walks_tree(options_in, context_in.device())),
-        packets(context_in, options_in),
-        kept_capped(context_in, 2, "capped rays of a view") {
-    kept_capped.clear();
+        packets(context_in, options_in) {
     set_background(options_in.background, options_in.sky);
   }
 
@@ -149,8 +147,7 @@ struct ViewTracer::Impl {
   bool tree;  // rays walk it though they could be traced by tiles
   CameraTracer packets;
   std::uint64_t packets_revision = 0;
-  Buffer<std::uint32_t> kept_capped;  // rays that stopped because of max_hits, two words
-  std::optional<Rays> rays;           // once a view needs it
+  std::optional<Rays> rays;  // once a view needs it
   std::function<void(double)> watch;
   std::size_t part = 0, parts = 1;  // of pictures
   // The last view.
@@ -216,11 +213,6 @@ void ViewTracer::forward(const DeviceGaussians& gaussians,
   self.options.background = self.background;
   self.packets.set_background(self.background);
   self.packets.forward(gaussians, camera, keep, sizes);
-  // Now: backward() may trace parts again.
-  if (keep) {
-    self.kept_capped.clear();
-    self.kept_capped.copy_from(self.packets.counters(), 1, RS_COUNT_CAPPED);
-  }
   self.by_rays = false;
   if (self.sky) {
     // backward() may trace parts again, over black.
@@ -290,7 +282,6 @@ void ViewTracer::Impl::forward_rays(const DeviceGaussians& gaussians, bool keep)
     context.finish();
     watch(static_cast<double>(first + count - begin) / static_cast<double>(end - begin));
   }
-  if (keep) kept_capped.copy_from(rays->capped, 2);
 }
 
 void ViewTracer::set_share(std::size_t part, std::size_t parts) {
@@ -434,7 +425,11 @@ std::uint64_t ViewTracer::reflected_rays() const {
 CameraTracer::Statistics ViewTracer::statistics() const {
   return impl_->by_rays ? CameraTracer::Statistics() : impl_->packets.statistics();
 }
-const Buffer<std::uint32_t>& ViewTracer::kept_capped_rays() const { return impl_->kept_capped; }
+ViewTracer::CappedRays ViewTracer::capped_on_device() const {
+  const Impl& self = *impl_;
+  if (self.by_rays) return {self.rays->capped, 0, true};
+  return {self.packets.counters(), RS_COUNT_CAPPED, false};
+}
 const Buffer<std::uint32_t>& ViewTracer::overflow() const { return impl_->packets.overflow(); }
 void ViewTracer::clear_overflow() { impl_->packets.clear_overflow(); }
 

@@ -105,8 +105,13 @@ class ViewTracer {
   /// What the last view took, on every device the same; zeros where it was traced ray by ray.
   /// Blocks.
   CameraTracer::Statistics statistics() const;
-  /// capped_rays() of the last forward(keep = true) on the device: two words, the lower first.
-  const Buffer<std::uint32_t>& kept_capped_rays() const;
+  /// capped_rays() on the device, until backward().
+  struct CappedRays {
+    const Buffer<std::uint32_t>& words;
+    std::uint32_t place;  ///< of the lower word of the count
+    bool wide;            ///< whether the next one is its higher word
+  };
+  CappedRays capped_on_device() const;
   const Context& context() const;
 
  private:

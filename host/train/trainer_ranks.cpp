@@ -64,11 +64,9 @@ void Trainer::Impl::read_ahead(std::int64_t turn) {
 bool Trainer::Impl::sum_views() {
   if (ranks.size() > 1) {
     sum.wait();
-    const std::vector<std::uint32_t> capped = guard.step_capped().download();
     StepWord sum_of_all{0, 0, 0, 0};
-    for (const StepWord& word :
-         ranks.all_gather(StepWord{std::uint64_t{capped[1]} << 32 | capped[0], reflected_rays,
-                                   guard.marked(), asked.stop_wished ? 1u : 0u})) {
+    for (const StepWord& word : ranks.all_gather(StepWord{
+             guard.step_capped(), reflected_rays, guard.marked(), asked.stop_wished ? 1u : 0u})) {
       sum_of_all.capped_rays += word.capped_rays;
       sum_of_all.reflected_rays += word.reflected_rays;
       sum_of_all.mark |= word.mark;
@@ -76,7 +74,7 @@ bool Trainer::Impl::sum_views() {
     }
     guard.set_mark(sum_of_all.mark);
     if ((sum_of_all.mark & RS_GUARD_REPEATED) != 0) {
-      guard.close(adam.refused(), guard.step_capped(), gaussians.count);
+      guard.close(adam.refused(), gaussians.count);
       tracer.clear_overflow();
       await_sizes = true;
       return false;

@@ -43,8 +43,8 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
                : tracer.image();
   const DevicePhoto photo = photo_cache.get(view, camera.width, camera.height);
   loss.evaluate(shown, photo, cut_out, behind, camera.width, camera.height, image_gradient);
-  guard.check_loss(loss.partials(), tracer.overflow());
-  fit.note(view, divisor == 1, loss.partials(), tracer.overflow());
+  guard.check_view(loss.partials(), tracer.overflow(), tracer.capped_on_device(),
+                   fit.place(view, divisor == 1), slot == share.first);
   if (exposure) {
     exposure->observe(tracer.image(), photo, behind, camera.width, camera.height, slot);
     exposure->backward(image_gradient, view, behind, camera.width, camera.height);
@@ -62,7 +62,6 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
     gradients.sky.ensure(context, sky_gradient.size(), "sky gradient of a view");
     gradients.sky.copy_from(sky_gradient, sky_gradient.size());
   }
-  guard.count_capped(tracer.kept_capped_rays(), slot == share.first);
   sum.add(slot, gradients);
 }
 
@@ -115,8 +114,7 @@ void Trainer::Impl::enqueue_step() {
   footprint.apply(gaussians, guard.mark(), thickness);
   if (mean.add(options, gaussians, iteration + 1, guard.mark()))
     footprint.apply(mean.model(), guard.mark(), thickness);
-  guard.close(adam.refused(), several ? guard.step_capped() : tracer.kept_capped_rays(),
-              gaussians.count);
+  guard.close(adam.refused(), gaussians.count);
   ++iteration;
   whole = true;
   stepped = true;

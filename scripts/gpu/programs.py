@@ -112,7 +112,6 @@ PROGRAMS = [
     ("parameter mean", "train/parameter_mean.cl", dict(SH_FLOATS=48)),
     ("mcmc", "train/mcmc.cl", dict(SIGMOID_SCALE=0)),
     ("guard", "train/step_guard.cl", {}),
-    ("photo fit", "train/photo_fit.cl", {}),
     ("gradient tree", "train/gradient_tree.cl", {}),
     ("view sizes", "trace/view_sizes.cl", {}),
     ("exposure", "train/exposure.cl", {}),

@@ -9,20 +9,13 @@
 namespace raysplats {
 
 PhotoFit::PhotoFit(Context& context, std::size_t views)
-    : note_(context.kernel("train/photo_fit.cl", "note_fit")),
-      sums_(context, RS_FIT_ITEMS * views, "fit of photos"),
-      full_size_(views) {
+    : sums_(context, RS_FIT_ITEMS * views, "fit of photos"), full_size_(views) {
   sums_.clear();
 }
 
-void PhotoFit::note(std::size_t view,
-                    bool full_size,
-                    const ImageLoss::Partials& loss,
-                    const Buffer<std::uint32_t>& overflow) {
+PhotoFit::Place PhotoFit::place(std::size_t view, bool full_size) {
   full_size_[view] = full_size;
-  if (!full_size) return;
-  note_.launch(Range{{RS_FIT_ITEMS, 1, 1}, {0, 0, 0}, {}}, loss.pixel, loss.pixel_sums, overflow,
-               static_cast<std::uint32_t>(view), sums_);
+  return {sums_, full_size ? static_cast<std::int32_t>(view) : -1};
 }
 
 void PhotoFit::forget() { full_size_.assign(full_size_.size(), false); }

@@ -3,11 +3,11 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "device/buffer.hpp"
 #include "device/context.hpp"
-#include "train/loss/image_loss.hpp"
 
 namespace raysplats {
 
@@ -17,19 +17,20 @@ class PhotoFit {
  public:
   PhotoFit(Context& context, std::size_t views);
 
-  /// A step has seen the photo of `view` (enqueues). Steps at full size count alone: others have
-  /// other errors.
-  void note(std::size_t view,
-            bool full_size,
-            const ImageLoss::Partials& loss,
-            const Buffer<std::uint32_t>& overflow);
+  /// Where a step that sees a photo notes it (train/step_guard.cl).
+  struct Place {
+    Buffer<std::array<float, 2>>& sums;
+    std::int32_t view;  ///< -1: it does not
+  };
+  /// That of a step with the photo of `view`. Steps at full size count alone: others have other
+  /// errors.
+  Place place(std::size_t view, bool full_size);
   /// As if no step had been.
   void forget();
   /// Decibels per view; NaN where none has seen it or the last one was not at full size. Blocks.
   std::vector<double> psnr() const;
 
  private:
-  Kernel note_;
   Buffer<std::array<float, 2>> sums_;
   std::vector<bool> full_size_;
 };

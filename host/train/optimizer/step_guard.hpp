@@ -5,7 +5,9 @@
 #include <cstdint>
 
 #include "device/context.hpp"
+#include "light/view_tracer.hpp"
 #include "train/loss/image_loss.hpp"
+#include "train/loss/photo_fit.hpp"
 
 namespace raysplats {
 
@@ -28,18 +30,18 @@ class StepGuard {
 
   explicit StepGuard(Context& context);
 
-  /// Marks the present step when the sums of its loss are not finite, or the word of `overflow` is
-  /// not 0.
-  void check_loss(const ImageLoss::Partials& loss, const Buffer<std::uint32_t>& overflow);
-  /// For steps of several views: adds the ViewTracer::kept_capped_rays() of one to step_capped(),
-  /// which begins anew with the first.
-  void count_capped(const Buffer<std::uint32_t>& capped, bool first);
-  const Buffer<std::uint32_t>& step_capped() const { return step_capped_; }
+  /// A view of the present step whose loss is known, before its backward pass. Marks the step when
+  /// the sums of the loss are not finite, or the word of `overflow` is not 0; adds `capped` to the
+  /// rays of the step that the cap on hits stopped, which begin anew with the first view; and notes
+  /// in `fit` how near the picture was to its photo.
+  void check_view(const ImageLoss::Partials& loss,
+                  const Buffer<std::uint32_t>& overflow,
+                  const ViewTracer::CappedRays& capped,
+                  const PhotoFit::Place& fit,
+                  bool first);
   /// After the update: counts. `refused` is Adam's count of refused gradients, `count` the
-  /// Gaussians, `capped` the rays of the step that the cap on hits stopped.
-  void close(const Buffer<std::uint32_t>& refused,
-             const Buffer<std::uint32_t>& capped,
-             std::size_t count);
+  /// Gaussians.
+  void close(const Buffer<std::uint32_t>& refused, std::size_t count);
 
   /// Not 0 in its first word: the kernels of this step change nothing.
   const Buffer<std::uint32_t>& mark() const { return state_; }
@@ -47,6 +49,8 @@ class StepGuard {
   /// close() counts nothing.
   std::uint32_t marked() const { return state_.read(0); }
   void set_mark(std::uint32_t word);
+  /// Rays of the step that the cap on hits stopped, which they add up; blocks.
+  std::uint64_t step_capped() const;
   void set_step_capped(std::uint64_t rays);
   /// Blocks.
   Counts counts() const;
@@ -54,10 +58,8 @@ class StepGuard {
   void restore(const Counts& counts);
 
  private:
-  Context* context_;
   Kernel check_, close_;
-  Kernel add_;  // of steps of several views
-  Buffer<std::uint32_t> state_, step_capped_;
+  Buffer<std::uint32_t> state_;
 };
 
 }  // namespace raysplats

@@ -288,7 +288,7 @@ TEST_CASE("cameras that a view cannot be traced from are refused") {
   CHECK_NOTHROW(tiles.forward(gaussians, view_of(CameraModel::kPinhole, 8, 8, 9)));
 }
 
-TEST_CASE("rays that stop at the cap on hits are told of the last view and the last one kept") {
+TEST_CASE("rays that stop at the cap on hits are told of the last view, on the device as well") {
   Context context = make_test_context();
   const Gaussians model = reference::random_scene(400, 96, 0);
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
@@ -306,23 +306,24 @@ TEST_CASE("rays that stop at the cap on hits are told of the last view and the l
   CHECK(by_rays > 200);
   CHECK(by_packets > 200);
   const auto kept = [&tracer] {
-    const std::vector<std::uint32_t> words = tracer.kept_capped_rays().download();
-    return std::uint64_t{words[1]} << 32 | words[0];
+    const ViewTracer::CappedRays capped = tracer.capped_on_device();
+    const std::vector<std::uint32_t> words = capped.words.download();
+    return words[capped.place] + (capped.wide ? std::uint64_t{words[capped.place + 1]} << 32 : 0);
   };
-  CHECK(kept() == 0);
+  CHECK(kept() == by_packets);
   Buffer<float> gradient(context, 4 * 90 * 80, "image gradient");
   gradient.clear();
   GaussianGradients out;
   for (int repetition = 0; repetition < 2; ++repetition) {
     tracer.forward(gaussians, camera, true);
+    CHECK(kept() == by_rays);
     tracer.backward(gaussians, gradient, out);
     CHECK(tracer.capped_rays() == by_rays);
-    CHECK(kept() == by_rays);
     tracer.forward(gaussians, pinhole, true);
+    CHECK(kept() == by_packets);
     tracer.backward(gaussians, gradient, out);  // traces bands again
-    CHECK(kept() == by_packets);
-    tracer.forward(gaussians, camera);  // of an evaluation
+    tracer.forward(gaussians, camera);          // of an evaluation
     CHECK(tracer.capped_rays() == by_rays);
-    CHECK(kept() == by_packets);
+    CHECK(kept() == by_rays);
   }
 }

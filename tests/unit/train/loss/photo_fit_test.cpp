@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "train/optimizer/step_guard.hpp"
 #include "unit/fixture.hpp"
 
 using namespace raysplats;
@@ -28,8 +29,14 @@ TEST_CASE("the fit of a photo is that of its last step at full size [small]") {
   const ImageLoss::Partials loss{pixel, ssim, static_cast<int>(parts.size()), 1};
   Buffer<std::uint32_t> overflow(context, 1, "overflow");
   overflow.clear();
+  Buffer<std::uint32_t> capped(context, 2, "capped");
+  capped.clear();
+  StepGuard guard(context);
   PhotoFit fit(context, 3);
-  fit.note(1, true, loss, overflow);
+  const auto note = [&](std::size_t view, bool full_size) {
+    guard.check_view(loss, overflow, {capped, 0, true}, fit.place(view, full_size), true);
+  };
+  note(1, true);
   const double expected = 10.0 * std::log10(weight / error);
   CHECK(fit.psnr()[1] == doctest::Approx(expected).epsilon(1e-5));
   CHECK(std::isnan(fit.psnr()[0]));
@@ -37,12 +44,12 @@ TEST_CASE("the fit of a photo is that of its last step at full size [small]") {
   for (std::array<float, 4>& part : parts) part[1] *= 10;
   pixel.upload(parts);
   overflow.upload(std::array<std::uint32_t, 1>{1});
-  fit.note(1, true, loss, overflow);
+  note(1, true);
   CHECK(fit.psnr()[1] == doctest::Approx(expected).epsilon(1e-5));
   overflow.clear();
-  fit.note(2, true, loss, overflow);
+  note(2, true);
   CHECK(fit.psnr()[2] == doctest::Approx(expected - 10.0).epsilon(1e-5));
-  fit.note(1, false, loss, overflow);
+  note(1, false);
   CHECK(std::isnan(fit.psnr()[1]));
   fit.forget();
   CHECK(std::isnan(fit.psnr()[2]));

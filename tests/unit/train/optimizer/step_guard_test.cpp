@@ -30,7 +30,8 @@ struct Fixture {
   Buffer<float> gradient;
   Buffer<std::uint32_t> refused{context, 1, "refused"};
   Buffer<std::uint32_t> overflow{context, 1, "overflow"};
-  Buffer<std::uint32_t> capped{context, 2, "capped"};
+  Buffer<std::uint32_t> capped{context, 3, "capped"};
+  PhotoFit fit{context, 1};
   std::uint32_t refused_so_far = 0;
 
   Fixture() {
@@ -46,11 +47,15 @@ struct Fixture {
     pixels[777] = value;
     image.upload(pixels);
     loss.evaluate(image, {photo}, false, {0, 0, 0}, kSide, kSide, gradient);
-    guard.check_loss(loss.partials(), overflow);
+    look(0, true);
     marked = guard.mark().read(0) != 0;
     refused_so_far += refusals;
     refused.upload(std::array<std::uint32_t, 1>{refused_so_far});
-    guard.close(refused, capped, count);
+    guard.close(refused, count);
+  }
+  // A view whose loss is that of the last step; its capped rays stand from word `place` on.
+  void look(std::uint32_t place, bool first, bool wide = true) {
+    guard.check_view(loss.partials(), overflow, {capped, place, wide}, fit.place(0, false), first);
   }
   bool marked = false;  // the last step
 };
@@ -166,4 +171,22 @@ TEST_CASE("a step whose view had no room is marked and counts as if it had not b
   StepGuard resumed(f.context);
   resumed.restore(f.guard.counts());
   CHECK(resumed.counts().capped_rays == 0x5ffffffe0u);
+}
+
+TEST_CASE("the views of a step add up what the cap on hits stopped [small]") {
+  Fixture f;
+  f.step(0.5f);
+  f.capped.upload(std::array<std::uint32_t, 3>{5, 0xfffffff0u, 7});
+  f.look(1, true);
+  CHECK(f.guard.step_capped() == 0x7fffffff0u);
+  f.look(1, false, false);  // the next word counts something else
+  CHECK(f.guard.step_capped() == 0x8ffffffe0u);
+  f.guard.close(f.refused, 5000);
+  CHECK(f.guard.counts().capped_rays == 0x8ffffffe0u);
+  f.look(0, true, false);
+  f.look(0, false, false);
+  CHECK(f.guard.step_capped() == 10);
+  f.guard.set_step_capped(0x300000001u);  // with those of other ranks
+  f.guard.close(f.refused, 5000);
+  CHECK(f.guard.counts().capped_rays == 0xbffffffe1u);
 }
