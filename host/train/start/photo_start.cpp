@@ -44,6 +44,21 @@ glm::dvec3 median_color(std::vector<glm::dvec3>& colors) {
   return out;
 }
 
+// The points whose places are kept.
+template <class Keeps>
+PointCloud kept_points(const PointCloud& points, const Keeps& keeps) {
+  std::vector<std::uint8_t> kept(points.size());
+  in_parallel(points.size(), [&](std::size_t i) {
+    const float* p = points.positions.data() + 3 * i;
+    kept[i] = keeps(glm::dvec3(p[0], p[1], p[2]));
+  });
+  PointCloud out;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (kept[i]) append_point(points, i, out);
+  }
+  return out;
+}
+
 }  // namespace
 
 PointCloud carved_points(std::span<const SmallPhoto> photos,
@@ -77,25 +92,29 @@ PointCloud carved_points(std::span<const SmallPhoto> photos,
 }
 
 PointCloud hull_points(const PointCloud& points, std::span<const SmallPhoto> photos) {
-  std::vector<std::uint8_t> inside(points.size());
-  in_parallel(points.size(), [&](std::size_t i) {
-    const float* p = points.positions.data() + 3 * i;
+  return kept_points(points, [&](const glm::dvec3& world) {
     std::size_t looked = 0, shown = 0;
     for (const SmallPhoto& photo : photos) {
-      const auto point = photo.sees({p[0], p[1], p[2]});
+      const auto point = photo.sees(world);
       if (!point || !photo.known(*point)) continue;
       ++looked;
       shown += shows_something(photo, *point) ? 1 : 0;
     }
-    inside[i] = 2 * shown > looked;
+    return 2 * shown > looked;
   });
-  PointCloud out;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const float* p = points.positions.data() + 3 * i;
-    const float* c = points.colors.data() + 3 * i;
-    if (inside[i]) append_point(out, {p[0], p[1], p[2]}, {c[0], c[1], c[2]});
-  }
-  return out;
+}
+
+PointCloud counted_points(const PointCloud& points, std::span<const SmallPhoto> photos) {
+  return kept_points(points, [&](const glm::dvec3& world) {
+    std::size_t looked = 0, counted = 0;
+    for (const SmallPhoto& photo : photos) {
+      const auto point = photo.sees(world);
+      if (!point) continue;
+      ++looked;
+      counted += photo.known(*point) && photo.at(*point).w >= 0.5 ? 1 : 0;
+    }
+    return 2 * counted >= looked;
+  });
 }
 
 PointCloud scattered_points(std::span<const SmallPhoto> photos,

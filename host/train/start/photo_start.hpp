@@ -28,6 +28,10 @@ PointCloud carved_points(std::span<const SmallPhoto> photos,
 /// Points that none of `photos` sees are left out, so these have to be all.
 PointCloud hull_points(const PointCloud& points, std::span<const SmallPhoto> photos);
 
+/// Those of a data set's points that masks leave: most of the photos that see a point's place count
+/// there, or none sees it.
+PointCloud counted_points(const PointCloud& points, std::span<const SmallPhoto> photos);
+
 /// Points in random places, half of them evenly in `region`, half on the rays of random pixels of
 /// the photos at any depth of the range, evenly by its logarithm. Their colours are the medians of
 /// what some of the photos show there; grey where no photo looks.

@@ -123,6 +123,14 @@ PointCloud start_points(const Dataset& dataset,
                    reliable.size() - hull.size(), reliable.size());
     }
     reliable = std::move(hull);
+  } else if (options.init == "auto") {
+    // No photo tells what becomes of a Gaussian that masks hide: it would stay as it began.
+    PointCloud counted = counted_points(reliable, photos(PhotoChoice::kSome));
+    if (counted.size() < reliable.size()) {
+      spdlog::info("{} of {} sparse points lie where most photos do not count",
+                   reliable.size() - counted.size(), reliable.size());
+    }
+    reliable = std::move(counted);
   }
   if (options.init == "auto" && reliable.size() > 0) {
     PointMatch match = match_points(reliable, cameras, photos(PhotoChoice::kSome));

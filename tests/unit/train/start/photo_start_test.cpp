@@ -14,7 +14,9 @@
 #include "scene/camera/camera_model.hpp"
 #include "train/start/initialization.hpp"
 #include "train/start/plane_sweep.hpp"
+#include "train/start/point_cloud.hpp"
 #include "unit/train/test_photos.hpp"
+#include "util/rng.hpp"
 
 using namespace raysplats;
 using namespace raysplats::test;
@@ -105,6 +107,45 @@ TEST_CASE("points that cut-out photos show as background are left out") {
   REQUIRE(hull.size() == 2);
   CHECK(hull.positions[5] == points.positions[5]);
   CHECK(hull.colors[3] == 0.2f);
+}
+
+TEST_CASE("points that masks hide from most photos are left out of a start") {
+  // A body in the middle, of which masks leave out what is around it.
+  std::vector<SmallPhoto> photos;
+  const auto masked = [](const CameraRay& ray) {
+    const double along = -glm::dot(ray.origin, ray.direction);
+    const bool body = glm::length(ray.origin + along * ray.direction) < 0.5;
+    return glm::dvec4(0.5, 0.5, 0.5, body ? 1.0 : 0.0);
+  };
+  std::vector<Camera> cameras = ring(12, 4, {0, 0, 0});
+  for (Camera& camera : cameras) {
+    camera.fx = camera.fy = 40;
+    photos.push_back(photo_of(camera, masked));
+  }
+  PointCloud points;
+  append_point(points, {0.1, 0, 0}, glm::dvec3(0.5));
+  append_point(points, {0, 0.3, -0.2}, glm::dvec3(0.5));
+  append_point(points, {0, 0, 900}, glm::dvec3(0.5));  // nobody looks there
+  append_point(points, {1.5, 0, 0}, glm::dvec3(0.5));  // beside the body
+  append_point(points, {0, -3, -1}, glm::dvec3(0.5));  // behind it
+  const PointCloud counted = counted_points(points, photos);
+  REQUIRE(counted.size() == 3);
+  CHECK(counted.positions[8] == 900.0f);
+  // As a start takes them.
+  Dataset dataset;
+  CounterRng rng(3, 0);
+  for (int i = 0; i < 3000; ++i) {
+    const double far = i % 2 == 0 ? 0.25 : 1.5;
+    const double angle = 6.28 * rng.uniform();
+    append_point(dataset.points,
+                 {far * std::cos(angle), far * std::sin(angle), 0.2 * rng.uniform()},
+                 glm::dvec3(0.5));
+  }
+  const Gaussians model = initial_model(
+      dataset, cameras, [&](PhotoChoice) -> const auto& { return photos; }, 10000, {});
+  CHECK(model.size() == 1500);
+  for (std::size_t i = 0; i < model.size(); ++i)
+    CHECK(std::hypot(model.means[3 * i], model.means[3 * i + 1]) < 0.3);
 }
 
 TEST_CASE("the range of colours is that of the widest channel, without the few pixels beyond") {
