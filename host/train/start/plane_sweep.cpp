@@ -56,6 +56,7 @@ constexpr double kEnd = 1.25;  // times the nearest or farthest depth: an end of
 // From where a photo looks where. The axis of a fisheye inverts its lens, so all are found once.
 struct Pose {
   glm::dvec3 center, axis;
+  bool all_around = false;  // a panorama: its axis is as good as any other direction
 };
 
 std::vector<Pose> poses_of(std::span<const SmallPhoto> photos) {
@@ -64,9 +65,14 @@ std::vector<Pose> poses_of(std::span<const SmallPhoto> photos) {
   for (const SmallPhoto& photo : photos) {
     const Camera& camera = photo.camera;
     const CameraRay ray = camera_ray(camera, 0.5 * camera.width, 0.5 * camera.height);
-    out.push_back({camera.center(), ray.direction});
+    out.push_back({camera.center(), ray.direction, camera.model == CameraModel::kEquirectangular});
   }
   return out;
+}
+
+// How differently two photos look, 1 - cosine.
+double turn_between(const Pose& a, const Pose& b) {
+  return a.all_around && b.all_around ? 0.0 : 1.0 - glm::dot(a.axis, b.axis);
 }
 
 // The kMostCompared photos with the lowest ranks.
@@ -88,7 +94,7 @@ std::vector<std::size_t> neighbours_of(std::span<const Pose> poses,
     const double base = glm::distance(poses[i].center, poses[index].center) / distance;
     // Two photos from the same place say nothing about depth.
     if (i == index || base < kLeastBase) continue;
-    const double turn = 1.0 - glm::dot(poses[i].axis, poses[index].axis);
+    const double turn = turn_between(poses[i], poses[index]);
     ranked.emplace_back(std::abs(base - 0.15) + 2.0 * turn, i);
   }
   return foremost(std::move(ranked));
@@ -220,8 +226,7 @@ std::vector<std::size_t> distant_neighbours(std::span<const Pose> poses,
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const double base = glm::distance(poses[i].center, poses[index].center);
     const bool apart = i != index && base >= kLeastBase * distance;
-    if (apart && 1.0 - glm::dot(poses[i].axis, poses[index].axis) < kProbeTurn)
-      ranked.emplace_back(-base, i);
+    if (apart && turn_between(poses[i], poses[index]) < kProbeTurn) ranked.emplace_back(-base, i);
   }
   return foremost(std::move(ranked));
 }

@@ -96,6 +96,34 @@ TEST_CASE("photos turned against each other tell as much of depth") {
   CHECK(other > 0.8 * plain);
 }
 
+TEST_CASE("panoramas tell as much of depth wherever their middles look") {
+  // Along a hall, in which only near ones show a place alike.
+  const auto hall = [](const CameraRay& ray) {
+    const double across = std::hypot(ray.direction.y, ray.direction.z);
+    const glm::dvec3 p = ray.origin + 2.0 / std::max(across, 0.05) * ray.direction;
+    return glm::dvec4(0.5 + 0.4 * std::sin(5 * p.x + 2 * p.y),
+                      0.5 + 0.4 * std::cos(4 * p.x - 3 * p.z),
+                      0.5 + 0.4 * std::sin(6 * p.x + p.y - 2 * p.z), 1.0);
+  };
+  std::vector<SmallPhoto> alike, turned;
+  for (int i = 0; i < 24; ++i) {
+    const glm::dvec3 eye(0.5 * (i - 12), 0, 0);
+    const auto looking = [&](double angle) {
+      const glm::dvec3 to(std::cos(angle), std::sin(angle), 0);
+      Camera camera = look_at(eye, eye + to, {0, 0, 1}, 144, 72, 72);
+      set_equirectangular(camera);
+      return photo_of(camera, hall);
+    };
+    alike.push_back(looking(0.0));
+    turned.push_back(looking(2.4 * i));
+  }
+  const double plain = probe_sweep(alike, swept_depths(alike, 3.0, 3), 5).agreed;
+  const double other = probe_sweep(turned, swept_depths(turned, 3.0, 3), 5).agreed;
+  MESSAGE(plain << " of the pixels alike, " << other << " turned");
+  CHECK(plain > 0.3);
+  CHECK(other > 0.9 * plain);
+}
+
 TEST_CASE("photos through long lenses find a wall that a step of the usual length leaps over") {
   const auto far_wall = [](const CameraRay& ray) {
     const glm::dvec3 p = ray.origin - ray.origin.x / ray.direction.x * ray.direction;
