@@ -32,6 +32,9 @@ constexpr double kMargin = 1.05;
 constexpr double kLeastSpread = 0.03;
 constexpr double kMostBehind = 0.2;  // share of the cameras that may look away from their target
 constexpr double kFarAway = 4.0;     // times the median: what reaches further is background
+// Lengths of mean directions: photos straight down, taken on lines there and back.
+constexpr double kCancelledUps = 0.5;
+constexpr double kOneWay = 0.9;
 
 void check(const OrbitOptions& options) {
   if (options.frames < 1) {
@@ -117,14 +120,18 @@ SceneExtent scene_extent(const Gaussians& model) {
 }
 
 glm::dvec3 estimate_up(std::span<const Camera> cameras) {
-  glm::dvec3 sum(0.0);
+  glm::dvec3 sum(0.0), ahead(0.0);
   for (const Camera& camera : cameras) {
     // Row 1 of world-to-camera is the camera's y axis in the world; it points down in the image.
     sum -= glm::transpose(camera.rotation) * glm::dvec3(0.0, 1.0, 0.0);
+    ahead += view_axis(camera);
   }
+  const auto count = static_cast<double>(cameras.size());
   const double length = glm::length(sum);
-  const double least = 1e-3 * static_cast<double>(cameras.size());
-  return length > least && std::isfinite(length) ? sum / length : glm::dvec3(0.0, -1.0, 0.0);
+  const double forward = glm::length(ahead);
+  // What is left of ups that cancel says which lines of a flight were longer, no more.
+  if (length < kCancelledUps * count && forward > kOneWay * count) return -ahead / forward;
+  return length > 1e-3 * count && std::isfinite(length) ? sum / length : glm::dvec3(0.0, -1.0, 0.0);
 }
 
 void check_up(const glm::dvec3& up) {

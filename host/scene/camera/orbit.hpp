@@ -25,9 +25,9 @@ struct SceneExtent {
 /// out. An empty model gives the unit sphere.
 SceneExtent scene_extent(const Gaussians& model);
 
-/// The world direction that points up in most of the photos: the mean of the cameras' up axes,
-/// normalised. No cameras, or cameras that cancel out, give {0, -1, 0}: the y axis of COLMAP's and
-/// 3DGS' worlds points down.
+/// The world direction that points up in most photos: the mean of the cameras' up axes. Where those
+/// cancel it is away from what all look at, if all look one way (straight down, there and back),
+/// else {0, -1, 0}, as without cameras: the y axis of COLMAP's and 3DGS' worlds points down.
 glm::dvec3 estimate_up(std::span<const Camera> cameras);
 
 /// Field of view along the smaller image side that a camera of the model `as` takes from this one,

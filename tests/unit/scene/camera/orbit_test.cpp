@@ -216,6 +216,25 @@ TEST_CASE("up, distance and elevation come from the cameras") {
   CHECK(estimate_up({}) == glm::dvec3(0, -1, 0));
 }
 
+TEST_CASE("up is where photos straight down come from, whatever the lines of the flight were") {
+  // Seven lines of nine, there and back: one line more looks the one way than the other.
+  std::vector<Camera> flight;
+  for (int line = 0; line < 7; ++line) {
+    for (int i = 0; i < 9; ++i) {
+      const glm::dvec3 eye(15.0 * i, 18.0 * line, 80.0);
+      const glm::dvec3 heading(0.0, line % 2 == 0 ? 1.0 : -1.0, 0.0);
+      flight.push_back(
+          look_at(eye, eye + glm::dvec3(0.01 * (i % 3 - 1), 0.0, -1.0), heading, 60, 40, 50));
+    }
+  }
+  CHECK(glm::dot(estimate_up(flight), glm::dvec3(0, 0, 1)) > 0.999);
+  // Before a wall all look the same way too, and know what is up.
+  std::vector<Camera> wall;
+  for (int i = 0; i < 9; ++i)
+    wall.push_back(look_at({0.1 * i, 0, 0}, {0.1 * i, 4, 0}, {0, 0, 1}, 60, 40, 50));
+  CHECK(glm::dot(estimate_up(wall), glm::dvec3(0, 0, 1)) > 0.999);
+}
+
 TEST_CASE("photos that look at one point have it as their target, others have none") {
   const glm::dvec3 target(1.0, -2.0, 0.5);
   CounterRng rng(11, 0);
