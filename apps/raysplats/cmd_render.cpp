@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <glm/geometric.hpp>
 #include <memory>
 
 #include "commands.hpp"
@@ -24,6 +25,7 @@
 #include "render_output.hpp"
 #include "run/mirror_meshes.hpp"
 #include "run/model_source.hpp"
+#include "run/run_cameras.hpp"
 #include "scene/camera/camera_path.hpp"
 #include "scene/camera/orbit.hpp"
 #include "scene/morton_order.hpp"
@@ -105,6 +107,34 @@ std::vector<Camera> along(const RenderFlags& options, const std::vector<Camera>&
   return cameras;
 }
 
+/// The cameras of the run's photos where the model is a run's; none, with a warning, if their file
+/// is damaged.
+std::vector<Camera> trained_cameras(const ModelSource& source) {
+  try {
+    return run_cameras(source);
+  } catch (const DataError& error) {
+    spdlog::warn("the orbit knows no photos of the run: {}", error.what());
+    return {};
+  }
+}
+
+// A circle leaves rooms through their walls, and goes behind what was taken from one side.
+void warn_of_unseen(const std::vector<Camera>& frames,
+                    const std::vector<Camera>& photos,
+                    double distance) {
+  constexpr double kReach = 0.8;          // of the way to the centre: 47 degrees along the circle
+  constexpr std::size_t kUsualOneIn = 4;  // frames between photos that are far apart
+  if (photos.empty()) return;
+  const std::size_t unseen = unseen_views(frames, photos, kReach * distance);
+  if (unseen * kUsualOneIn <= frames.size()) return;
+  spdlog::warn(
+      "{} of {} frames of the orbit look from where no photo was taken, as through walls: what "
+      "they "
+      "show is a guess; --interpolate N (or --ellipse N, --spiral N) with --data stays with the "
+      "photos",
+      unseen, frames.size());
+}
+
 std::vector<Camera> orbit(const RenderFlags& options,
                           const Gaussians& model,
                           const std::vector<Camera>& photos) {
@@ -138,7 +168,9 @@ std::vector<Camera> orbit(const RenderFlags& options,
   if (options.fov) shape.fov_degrees = *options.fov;
   if (options.elevation) shape.elevation_degrees = *options.elevation;
   if (options.distance) shape.distance = *options.distance;
-  return orbit_cameras(extent, shape);
+  std::vector<Camera> frames = orbit_cameras(extent, shape);
+  warn_of_unseen(frames, photos, glm::distance(frames.front().center(), extent.center));
+  return frames;
 }
 
 /// The cameras of the frames, and how their time goes by.
@@ -173,7 +205,9 @@ RenderViews render_views(const RenderFlags& options,
   RenderViews views;
   views.closed = options.orbit || options.ellipse || options.spiral;
   if (options.orbit) {
-    views.cameras = orbit(options, model, cameras_of(dataset, Split::kAll));
+    const bool given = !options.data.data.empty();
+    views.cameras =
+        orbit(options, model, given ? cameras_of(dataset, Split::kAll) : trained_cameras(source));
   } else if (options.ellipse || options.spiral || options.interpolate) {
     views.cameras = along(options, cameras_of(dataset, Split::kAll));
   } else {

@@ -38,8 +38,9 @@ void add_camera_options(CLI::App& command, RenderFlags& options) {
       ->group(where)
       ->type_name("FILE");
   command
-      .add_option("--orbit", options.orbit,
-                  "N cameras on a circle around the model (with --data: as its cameras)")
+      .add_option(
+          "--orbit", options.orbit,
+          "N cameras on a circle around the model (with --data, and of a run: as its cameras)")
       ->group(where)
       ->transform(whole_between(1, 1e6))
       ->type_name("N");
@@ -110,14 +111,13 @@ void add_orbit_options(CLI::App& command, RenderFlags& options) {
   const std::string orbit = "Orbit";
   command
       .add_option("--width", options.width,
-                  "Pixels (800, or the data set's; one side alone keeps the shape)")
+                  "Pixels (800, or the photos'; one side alone keeps the shape)")
       ->group(orbit)
       ->transform(whole_between(1, kMaxSide));
   command.add_option("--height", options.height, "Pixels")
       ->group(orbit)
       ->transform(whole_between(1, kMaxSide));
-  command
-      .add_option("--fov", options.fov, "Degrees along the smaller side (45, or the data set's)")
+  command.add_option("--fov", options.fov, "Degrees along the smaller side (45, or the photos')")
       ->group(orbit)
       ->transform(between(kLeastFov, most_fov(CameraModel::kFisheye)));
   command

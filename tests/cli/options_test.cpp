@@ -81,6 +81,42 @@ TEST_CASE("one side of an orbit's pictures keeps their shape") {
   CHECK(size({"--camera-model", "fisheye", "--fov", "360", "--width", "16"}) == std::pair(16, 16));
 }
 
+TEST_CASE("an orbit of a run goes as its photos do, and says where none was taken") {
+  const TemporaryFolder folder;
+  const std::string run = folder / "run", model = run + "/point_cloud/iteration_1/point_cloud.ply";
+  std::filesystem::create_directories(run + "/point_cloud/iteration_1");
+  write_file(model, ply_file(2));
+  const auto orbit = [&](const std::string& photos) {
+    write_file(run + "/cameras.json", photos);
+    const Outcome outcome = succeed({"render", run, "--orbit", "8", "-o", folder / "frames",
+                                     "--overwrite", "--log-level", "warn"});
+    const raysplats::Image image = raysplats::read_image(folder / "frames/frame_0000.png");
+    CHECK(image.width == 24);
+    CHECK(image.height == 16);
+    return outcome.err;
+  };
+  const auto photo = [](const std::string& place, const std::string& rotation) {
+    return "{\"img_name\": \"a\", \"width\": 24, \"height\": 16, \"fx\": 20, \"fy\": 20, "
+           "\"position\": " +
+           place + ", \"rotation\": " + rotation + "}";
+  };
+  const std::string ahead = "[[1,0,0],[0,1,0],[0,0,1]]", back = "[[-1,0,0],[0,1,0],[0,0,-1]]";
+  const std::string right = "[[0,0,1],[0,1,0],[-1,0,0]]", left = "[[0,0,-1],[0,1,0],[1,0,0]]";
+  // Four photos around the balls, then all of them along one line.
+  CHECK_FALSE(contains(orbit("[" + photo("[0,0,-4]", ahead) + "," + photo("[0,0,4]", back) + "," +
+                             photo("[-4,0,0]", right) + "," + photo("[4,0,0]", left) + "]"),
+                       "no photo was taken"));
+  CHECK(contains(orbit("[" + photo("[0,0,-4]", ahead) + "," + photo("[0,0,-3]", ahead) + "," +
+                       photo("[0,0,-2]", ahead) + "]"),
+                 "frames of the orbit look from where no photo was taken"));
+  // A damaged list costs the photos, not the orbit.
+  write_file(run + "/cameras.json", "[{");
+  CHECK(contains(succeed({"render", run, "--orbit", "1", "--width", "16", "-o", folder / "more",
+                          "--log-level", "warn"})
+                     .err,
+                 "knows no photos of the run"));
+}
+
 TEST_CASE("ranges are the same on the command line, in [trace] and in configurations") {
   const TemporaryFolder folder;
   write_file(folder / "balls.ply", ply_file(2));

@@ -30,8 +30,9 @@ constexpr double kReach = 2.0;   // standard deviations of a Gaussian that are t
 constexpr double kMargin = 1.05;
 // Axes within about 10 degrees of each other: where they meet is lost in noise.
 constexpr double kLeastSpread = 0.03;
-constexpr double kMostBehind = 0.2;  // share of the cameras that may look away from their target
-constexpr double kFarAway = 4.0;     // times the median: what reaches further is background
+constexpr double kMostBehind = 0.2;   // share of the cameras that may look away from their target
+constexpr double kLeastCosine = 0.5;  // between axes of views that show the same sides of things
+constexpr double kFarAway = 4.0;      // times the median: what reaches further is background
 // Lengths of mean directions: photos straight down, taken on lines there and back.
 constexpr double kCancelledUps = 0.5;
 constexpr double kOneWay = 0.9;
@@ -65,6 +66,10 @@ void check(const OrbitOptions& options) {
                                  options.distance));
   }
   check_up(options.up);
+}
+
+bool has_narrow_view(const Camera& camera) {
+  return camera.model == CameraModel::kPinhole || camera.model == CameraModel::kOpenCv;
 }
 
 // Standard deviation of a Gaussian along a direction, the largest of its three for none; 0 for one
@@ -194,6 +199,21 @@ OrbitOptions orbit_like(std::span<const Camera> cameras,
   options.distance = median(distances);
   options.elevation_degrees = std::clamp(median(elevations), -80.0, 80.0);
   return options;
+}
+
+std::size_t unseen_views(std::span<const Camera> cameras,
+                         std::span<const Camera> photos,
+                         double reach) {
+  const auto vouches = [&](const Camera& photo, const Camera& camera) {
+    if (glm::distance(photo.center(), camera.center()) > reach) return false;
+    if (!has_narrow_view(photo) || !has_narrow_view(camera)) return true;
+    return glm::dot(view_axis(photo), view_axis(camera)) >= kLeastCosine;
+  };
+  const auto unseen = std::count_if(cameras.begin(), cameras.end(), [&](const Camera& camera) {
+    return std::none_of(photos.begin(), photos.end(),
+                        [&](const Camera& photo) { return vouches(photo, camera); });
+  });
+  return static_cast<std::size_t>(unseen);
 }
 
 std::vector<Camera> orbit_cameras(const SceneExtent& extent, const OrbitOptions& options) {

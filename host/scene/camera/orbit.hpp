@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <glm/vec3.hpp>
 #include <optional>
 #include <span>
@@ -63,6 +64,13 @@ std::optional<glm::dvec3> common_target(std::span<const Camera> cameras);
 OrbitOptions orbit_like(std::span<const Camera> cameras,
                         const glm::dvec3& center,
                         OrbitOptions options);
+
+/// How many of the cameras look from where no photo does: none within `reach` of their centres
+/// looks within 60 degrees of where they look. What they show is a guess. Of wide lenses and
+/// panoramas, and of photos and cameras through parallel rays, the place alone counts.
+std::size_t unseen_views(std::span<const Camera> cameras,
+                         std::span<const Camera> photos,
+                         double reach);
 
 /// Cameras on a full circle around `extent`, equally spaced, counter-clockwise seen from above, all
 /// looking at the centre. Throws UsageError for sizes, counts, angles, models or directions that

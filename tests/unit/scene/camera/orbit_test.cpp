@@ -235,6 +235,32 @@ TEST_CASE("up is where photos straight down come from, whatever the lines of the
   CHECK(glm::dot(estimate_up(wall), glm::dvec3(0, 0, 1)) > 0.999);
 }
 
+TEST_CASE("views that no photo vouches for are counted") {
+  const auto camera = [](const glm::dvec3& eye, const glm::dvec3& target) {
+    return look_at(eye, target, {0, -1, 0}, 80, 60, 70.0);
+  };
+  OrbitOptions options;
+  options.frames = 24;
+  options.distance = 4.0;
+  const SceneExtent extent{glm::dvec3(0.0), 1.0};
+  const std::vector<Camera> around = orbit_cameras(extent, options);
+  std::vector<Camera> half(around.begin(), around.begin() + 12), corridor, panorama;
+  for (int i = 0; i < 10; ++i) corridor.push_back(camera({0, 0, i - 5.0}, {0, 0, i}));
+  Camera everywhere = camera({0, 0, 0}, {0, 0, 1});
+  everywhere.model = CameraModel::kEquirectangular;
+  panorama.push_back(everywhere);
+  CHECK(unseen_views(around, around, 3.0) == 0);
+  const std::size_t behind = unseen_views(around, half, 3.0);
+  CHECK(behind >= 4);
+  CHECK(behind <= 8);
+  // Of a circle in a corridor, what looks along it at most.
+  CHECK(unseen_views(around, corridor, 3.0) >= 14);
+  CHECK(unseen_views(around, panorama, 5.0) == 0);
+  CHECK(unseen_views(around, panorama, 3.0) == around.size());
+  CHECK(unseen_views(around, {}, 3.0) == around.size());
+  CHECK(unseen_views({}, around, 3.0) == 0);
+}
+
 TEST_CASE("photos that look at one point have it as their target, others have none") {
   const glm::dvec3 target(1.0, -2.0, 0.5);
   CounterRng rng(11, 0);
