@@ -32,6 +32,8 @@ constexpr std::size_t kMostPlaces = 20000;  // of points that fill cells, or hid
 constexpr std::size_t kFewerPlaces = 2000;  // at every scale
 constexpr int kNearCell = 10;               // pixels a side of what is near a point
 constexpr int kBareCells = 7;               // along a photo's longer side
+constexpr float kLeastStep = 12.0f / 255;   // between the neighbours of a pixel at an edge
+constexpr double kLeastEdges = 0.05;        // of the pixels of a cell that has texture
 constexpr double kBehind = 1.15;            // times as far as the nearest in a cell: hidden
 constexpr double kEvenColors = 1e-4;        // squared difference of points that tell nothing
 
@@ -127,6 +129,29 @@ class PhotoBeforePoints {
   Cells cells_;
   std::vector<double> nearest_;
 };
+
+// Whether the square around the middle has edges that points can be found at; a white wall has
+// none.
+bool is_textured(const SmallPhoto& photo, const glm::dvec2& middle, int side) {
+  const int left = std::max(1, static_cast<int>(middle.x) - side / 2);
+  const int top = std::max(1, static_cast<int>(middle.y) - side / 2);
+  const int right = std::min(left + side, photo.camera.width - 1);
+  const int bottom = std::min(top + side, photo.camera.height - 1);
+  std::size_t pixels = 0, edges = 0;
+  for (int y = top; y < bottom; ++y) {
+    for (int x = left; x < right; ++x) {
+      glm::vec2 step(0.0f);
+      for (std::size_t c = 0; c < 3; ++c) {
+        step.x += photo.color(x + 1, y)[c] - photo.color(x - 1, y)[c];
+        step.y += photo.color(x, y + 1)[c] - photo.color(x, y - 1)[c];
+      }
+      ++pixels;
+      edges += glm::length(step) >= 3 * kLeastStep ? 1 : 0;
+    }
+  }
+  return static_cast<double>(edges) >=
+         kLeastEdges * static_cast<double>(std::max<std::size_t>(pixels, 1));
+}
 
 // Mean of the lower half, of two at least: something may hide the point from the others.
 double better_half(std::vector<double>& differences) {
@@ -255,7 +280,7 @@ PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> phot
 }
 
 double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos) {
-  std::size_t shown = 0, bare = 0;
+  std::size_t shown = 0, bare = 0, even = 0, bare_even = 0;
   for (const SmallPhoto& photo : photos) {
     const int width = photo.camera.width, height = photo.camera.height;
     const int side = std::max(1, std::max(width, height) / kBareCells);
@@ -264,11 +289,15 @@ double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos) 
       for (double x = 0.5 * std::min(side, width); x < width; x += side) {
         const glm::dvec2 middle(x, y);
         if (!photo.known(middle) || photo.at(middle).w < 0.5) continue;
-        ++shown;
-        bare += cells.taken(middle) ? 0 : 1;
+        const std::size_t without = cells.taken(middle) ? 0 : 1;
+        const bool textured = is_textured(photo, middle, side);
+        (textured ? shown : even) += 1;
+        (textured ? bare : bare_even) += without;
       }
     }
   }
+  // Photos without any texture tell no more than where points are.
+  if (shown == 0) shown = even, bare = bare_even;
   return shown > 0 ? static_cast<double>(bare) / static_cast<double>(shown) : 0;
 }
 

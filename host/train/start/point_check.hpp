@@ -44,8 +44,8 @@ bool colorless(const PointCloud& points);
 PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> photos);
 
 /// The share of what the photos show that lies in wide places without a point: square cells of a
-/// seventh of a photo's longer side, but for those that are transparent or masked out. 0 where
-/// nothing is shown.
+/// seventh of a photo's longer side, but for those that are transparent, masked out or without
+/// texture, as on white walls, where no point can be found. 0 where nothing is shown.
 double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos);
 
 /// The points of `found` that lie near others: in cells of 10 pixels a side that show some of

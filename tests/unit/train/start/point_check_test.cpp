@@ -201,6 +201,22 @@ TEST_CASE("points on a small part of what photos show are joined by points of th
   CHECK(spread(model()) < 0.16);
 }
 
+TEST_CASE("a white wall without points is no part that lacks them") {
+  // Above, the wall is white in one set of photos.
+  const auto white_above = [](const CameraRay& ray) {
+    const double t = (4.0 - ray.origin.x) / ray.direction.x;
+    return ray.origin.z + t * ray.direction.z > 0.0 ? glm::dvec4(0.9, 0.9, 0.9, 1.0) : wall(ray);
+  };
+  const std::vector<SmallPhoto> photos = photos_of_wall();
+  std::vector<SmallPhoto> white;
+  for (const SmallPhoto& photo : photos) white.push_back(photo_of(photo.camera, white_above));
+  const PointCloud below = points_below(0.0);
+  const double lacking = bare_share(below, photos), plain = bare_share(below, white);
+  MESSAGE(lacking << " of a textured wall, " << plain << " of a white one");
+  CHECK(lacking > 0.31);
+  CHECK(plain < 0.15);
+}
+
 TEST_CASE("points of photos that tell of depth stand beside sparse ones, in their places") {
   std::vector<SmallPhoto> photos = photos_of_wall();
   const std::vector<Camera> cameras = cameras_of(photos);
