@@ -6,8 +6,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <exception>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "device/context.hpp"
 #include "device/device_json.hpp"
@@ -56,6 +58,20 @@ bool has_device(const Diagnosis& diagnosis, const std::string& vendor) {
       });
 }
 
+/// Mesa's OpenCL offers only cards whose drivers a variable names.
+std::string or_mesa(const Diagnosis& diagnosis, const GraphicsCard& card) {
+  const bool present =
+      std::any_of(diagnosis.drivers.begin(), diagnosis.drivers.end(), [](const auto& driver) {
+        return driver.error.empty() && driver.library.find("Rusticl") != std::string::npos;
+      });
+  const char* enabled = std::getenv("RUSTICL_ENABLE");
+  if (!present || card.mesa.empty() ||
+      (enabled != nullptr && std::string_view(enabled).find(card.mesa) != std::string_view::npos)) {
+    return "";
+  }
+  return fmt::format(", or set RUSTICL_ENABLE={}: Mesa's OpenCL is here", card.mesa);
+}
+
 constexpr double kMebibyte = 1024.0 * 1024.0;
 
 std::string size_text(std::uint64_t bytes) {
@@ -93,8 +109,8 @@ std::vector<std::string> advice_on(const Diagnosis& diagnosis) {
   if (diagnosis.devices.empty()) advice.push_back(why_no_devices());
   for (const GraphicsCard& card : diagnosis.cards) {
     if (card.driver.empty() || has_device(diagnosis, card.vendor)) continue;
-    advice.push_back(fmt::format("The {} card at {} is not offered by OpenCL: install {}",
-                                 card.vendor, card.address, card.driver));
+    advice.push_back(fmt::format("The {} card at {} is not offered by OpenCL: install {}{}",
+                                 card.vendor, card.address, card.driver, or_mesa(diagnosis, card)));
   }
   if (!diagnosis.closed_files.empty()) {
     std::vector<std::string> names;

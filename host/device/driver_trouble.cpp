@@ -130,8 +130,9 @@ bool is_pocl(const std::string& platform) {
   return platform.find("Portable Computing Language") != std::string::npos;
 }
 
-std::string why_no_devices() {
-  const std::vector<std::string> platforms = platform_names();
+std::string why_no_devices() { return why_no_devices(platform_names()); }
+
+std::string why_no_devices(const std::vector<std::string>& platforms) {
   if (platforms.empty()) return why_no_platforms();
   for (const std::string& platform : platforms) {
     if (!is_pocl(platform)) continue;
@@ -143,6 +144,14 @@ std::string why_no_devices() {
       return fmt::format("The OpenCL platform {} offers no device: POCL_DEVICES is '{}', unset it",
                          platform, only);
     }
+  }
+  if (std::find(platforms.begin(), platforms.end(), "rusticl") != platforms.end()) {
+    const std::string only = variable("RUSTICL_ENABLE");
+    return fmt::format(
+        "The OpenCL platform {} offers no device{}: set RUSTICL_ENABLE to the driver of your card, "
+        "radeonsi (AMD) or iris (Intel), or install pocl-opencl-icd to run on the CPU",
+        fmt::join(platforms, ", "),
+        only.empty() ? "" : fmt::format(" with RUSTICL_ENABLE={}", only));
   }
   return fmt::format(
       "The OpenCL platform {} offers no device{}: 'clinfo' shows what its driver finds",

@@ -30,6 +30,8 @@ bool is_pocl(const std::string& platform);
 /// Why the OpenCL loader finds no device, as one sentence with what to do: no driver is registered,
 /// a driver's library cannot be loaded, or a driver has no place for its cache.
 std::string why_no_devices();
+/// The same of the platforms that the loader finds, by their names.
+std::string why_no_devices(const std::vector<std::string>& platforms);
 
 /// What keeps the driver of a platform from compiling though the source is right, for the end of a
 /// sentence: a cache folder that cannot be written, too little memory. Empty when nothing is found.

@@ -19,11 +19,12 @@ struct Vendor {
   const char* number;
   const char* name;
   const char* driver;
+  const char* mesa;
 };
 constexpr Vendor kVendors[] = {
-    {"0x10de", "NVIDIA", "NVIDIA's driver with its OpenCL part (Debian: nvidia-opencl-icd)"},
-    {"0x1002", "AMD", "ROCm's OpenCL (rocm-opencl-runtime of AMD's repository)"},
-    {"0x8086", "Intel", "Intel's compute runtime (Debian: intel-opencl-icd)"}};
+    {"0x10de", "NVIDIA", "NVIDIA's driver with its OpenCL part (Debian: nvidia-opencl-icd)", ""},
+    {"0x1002", "AMD", "ROCm's OpenCL (rocm-opencl-runtime of AMD's repository)", "radeonsi"},
+    {"0x8086", "Intel", "Intel's compute runtime (Debian: intel-opencl-icd)", "iris"}};
 
 std::string first_word(const fs::path& file) {
   std::ifstream stream(file);
@@ -41,11 +42,13 @@ std::vector<GraphicsCard> graphics_cards(const fs::path& bus) {
        entry.increment(error)) {
     const std::string kind = first_word(entry->path() / "class");
     if (!kind.starts_with(kDisplay) && !kind.starts_with(kAccelerator)) continue;
-    GraphicsCard card{entry->path().filename().string(), first_word(entry->path() / "vendor"), ""};
+    GraphicsCard card{entry->path().filename().string(), first_word(entry->path() / "vendor"), "",
+                      ""};
     for (const Vendor& vendor : kVendors) {
       if (card.vendor != vendor.number) continue;
       card.vendor = vendor.name;
       card.driver = vendor.driver;
+      card.mesa = vendor.mesa;
       break;
     }
     cards.push_back(std::move(card));

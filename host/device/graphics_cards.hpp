@@ -12,6 +12,7 @@ struct GraphicsCard {
   std::string address;  ///< "0000:01:00.0"
   std::string vendor;   ///< "NVIDIA", "AMD" or "Intel", else the vendor's number ("0x1af4")
   std::string driver;   ///< what brings OpenCL to it (docs/gpu.md); empty when that is not known
+  std::string mesa;     ///< what Mesa's OpenCL calls its driver; empty where that is no choice
 };
 
 /// Every display controller and processing accelerator of `bus`, by address; none where the system

@@ -106,6 +106,14 @@ TEST_CASE("cards on the bus are found by class and named by vendor") {
   REQUIRE(advice.size() == 2);
   CHECK(contains(advice[0], "intel-opencl-icd"));
   CHECK(contains(advice[1], "rocm-opencl-runtime"));
+
+  // Mesa's OpenCL keeps quiet about cards until it is told to use them.
+  diagnosis.drivers = {{"/etc/OpenCL/vendors/rusticl.icd", "libRusticlOpenCL.so.1", ""}};
+  CHECK(contains(advice_on(diagnosis)[1],
+                 "rocm-opencl-runtime of AMD's repository), or set "
+                 "RUSTICL_ENABLE=radeonsi"));
+  diagnosis.drivers[0].error = "no such file";
+  CHECK_FALSE(contains(advice_on(diagnosis).back(), "RUSTICL_ENABLE"));
 }
 
 TEST_CASE("files of cards, drivers that do not load and a locked cache have their advice") {

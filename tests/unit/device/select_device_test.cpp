@@ -9,9 +9,11 @@
 #include <string>
 
 #include "device/context.hpp"
+#include "device/driver_trouble.hpp"
 #include "device/platform.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/error.hpp"
+#include "unit/text.hpp"
 
 using namespace raysplats;
 
@@ -101,4 +103,9 @@ TEST_CASE("context: a device that has gone is refused") {
   info = select_device("");
   info.name += " of yesterday";
   CHECK_THROWS_AS(Context{info}, DeviceError);
+}
+
+TEST_CASE("where Mesa alone offers no device the variable that it heeds is named") {
+  CHECK(test::contains(why_no_devices({"rusticl", "Clover"}), "set RUSTICL_ENABLE to the driver"));
+  CHECK_FALSE(test::contains(why_no_devices({"Clover"}), "RUSTICL_ENABLE"));
 }
