@@ -7,11 +7,14 @@
 #include <cmath>
 #include <glm/vec3.hpp>
 #include <limits>
+#include <map>
 #include <ostream>
+#include <string_view>
 #include <vector>
 
 #include "device/context.hpp"
 #include "raysplats/device.hpp"
+#include "raysplats/error.hpp"
 #include "raysplats/rays.hpp"
 #include "reference/gradients.hpp"
 #include "reference/scenes.hpp"
@@ -37,19 +40,6 @@ struct Packet {
 
 inline std::ostream& operator<<(std::ostream& out, const Packet& packet) {
   return out << packet_shape_name(packet.shape) << " of " << packet.lanes;
-}
-
-/// Every shape of packet in the widths named; subgroups where the device has any, up to 32 wide.
-inline std::vector<Packet> packets(const std::vector<int>& vectors = {1, 2, 4, 8, 16},
-                                   const std::vector<int>& groups = {8, 16, 32, 64}) {
-  std::vector<Packet> out;
-  for (const int lanes : vectors) out.push_back({PacketShape::kVector, lanes});
-  for (const int lanes : groups) out.push_back({PacketShape::kGroup, lanes});
-  static const bool has_subgroups = test_device().has_subgroups;
-  for (const int lanes : groups) {
-    if (has_subgroups && lanes <= 32) out.push_back({PacketShape::kSubgroup, lanes});
-  }
-  return out;
 }
 
 /// Ellipsoids around one place, which overlap in depth from the first to the last: a packet has as
@@ -102,6 +92,38 @@ inline Image trace_image(Context& context,
   tracer.update(gaussians);
   tracer.forward(gaussians, camera);
   return tracer.download_image();
+}
+
+/// Whether the device makes one subgroup of a packet of so many rays: only the compiled kernel
+/// knows.
+inline bool is_one_subgroup(int lanes) {
+  if (!test_device().has_subgroups || lanes > 32) return false;
+  static std::map<int, bool> known;
+  const auto [found, is_new] = known.try_emplace(lanes, true);
+  if (!is_new) return found->second;
+  Context context = make_test_context();
+  try {
+    trace_image(context, reference::random_scene(1, 18, 0),
+                Packet{PacketShape::kSubgroup, lanes}.over({}), reference::cube_camera(9, 7));
+  } catch (const DeviceError& refusal) {
+    if (std::string_view(refusal.what()).find("subgroups of a packet") == std::string_view::npos)
+      throw;
+    MESSAGE("Left out: ", refusal.what());
+    found->second = false;
+  }
+  return found->second;
+}
+
+/// Every shape of packet in the widths named; subgroups in those that the device makes one of.
+inline std::vector<Packet> packets(const std::vector<int>& vectors = {1, 2, 4, 8, 16},
+                                   const std::vector<int>& groups = {8, 16, 32, 64}) {
+  std::vector<Packet> out;
+  for (const int lanes : vectors) out.push_back({PacketShape::kVector, lanes});
+  for (const int lanes : groups) out.push_back({PacketShape::kGroup, lanes});
+  for (const int lanes : groups) {
+    if (is_one_subgroup(lanes)) out.push_back({PacketShape::kSubgroup, lanes});
+  }
+  return out;
 }
 
 /// |a - b| / |b| of two vectors as wholes.
