@@ -15,6 +15,7 @@ import tempfile
 import zipfile
 
 LIBRARIES = "usr/lib/x86_64-linux-gnu"
+KEYS = "/usr/share/keyrings/debian-archive-keyring.gpg"
 
 
 def _llvm(major, version):
@@ -34,8 +35,17 @@ DEBIAN = {
         "libllvmspirvlib14=14.0.0-5",
         "libopencl-clang14=14.0.0-4",
     ],
-    # Its other libraries are those of Mesa's drivers for pictures, and of PoCL.
-    "rusticl": ["mesa-opencl-icd=22.3.6-1+deb12u2", "libclc-15=1:15.0.6-4", "libllvmspirvlib15=15.0.0-2"],
+    # Of a newer release, with that one's C library; its other libraries are those of Mesa's drivers for pictures, and of PoCL.
+    "rusticl": [
+        "libc6",
+        "mesa-opencl-icd=25.0.7-2+deb13u1",
+        *_llvm(19, "1:19.1.7-3+b1")[1:],
+        "libclc-19=1:19.1.7-3",
+        "libllvmspirvlib19.1=19.1.6-1",
+        "libdrm2=2.4.124-2",
+        "libdrm-amdgpu1=2.4.124-2",
+        "libelf1t64=0.192-4",
+    ],
 }
 UNLESS_PRESENT = {
     "libllvm14=1:14.0.6-12": "/" + LIBRARIES + "/libLLVM-14.so.1",
@@ -46,8 +56,10 @@ PYPI = {
     # The second is not among the declared dependencies of the first, which does not load without it.
     "intel-cpu": ["intel-opencl-rt==2026.2.0", "intel-cmplr-lib-rt==2026.2.0", "tbb==2023.2.0"],
 }
+# Debian's release where it is not that of this system.
+RELEASES = {"rusticl": "trixie"}
 # A folder of their own: they are taken whole, not file by file.
-APART = ("rusticl", "intel-cpu")
+APART = {"rusticl": "rusticl-25.0", "intel-cpu": "intel-cpu"}
 CLANG = {"amd": "usr/lib/llvm-22/bin/clang", "nvidia": "usr/lib/llvm-19/bin/clang"}
 
 
@@ -68,9 +80,13 @@ def _run(command, folder, what):
         raise Missing(f"{what} cannot be fetched: {errors[0].strip()}")
 
 
+def _done(cache, name):
+    return os.path.join(cache, "done", name.replace("/", "_"))
+
+
 def _once(cache, name, unpack):
     """Calls unpack(scratch folder) unless a former call went through."""
-    done = os.path.join(cache, "done", name.replace("/", "_"))
+    done = _done(cache, name)
     if os.path.exists(done):
         return
     os.makedirs(os.path.dirname(done), exist_ok=True)
@@ -82,9 +98,26 @@ def _once(cache, name, unpack):
         shutil.rmtree(scratch, ignore_errors=True)
 
 
-def _debian(package, root):
+def _of_release(release, cache):
+    """What tells apt-get to take packages from a release that this system's sources do not name, by its own lists of them."""
+    sites = subprocess.run(["apt-get", "indextargets", "--format", "$(SITE)"], capture_output=True, text=True, check=False).stdout.split()
+    mirror = next((site for site in sites if site.rstrip("/").endswith("/debian")), None)
+    if not mirror:
+        raise Missing(f"Debian's release {release} cannot be fetched: the sources of apt-get name no mirror of Debian")
+    folder = os.path.join(cache, release)
+    os.makedirs(os.path.join(folder, "lists", "partial"), exist_ok=True)
+    sources = os.path.join(folder, "sources.list")
+    with open(sources, "w", encoding="utf-8") as file:
+        file.write(f"deb [signed-by={KEYS}] {mirror} {release} main\n")
+    settings = (f"Dir::Etc::SourceList={sources}", "Dir::Etc::SourceParts=/dev/null", f"Dir::State::Lists={folder}/lists", f"Dir::Cache={folder}")
+    options = [word for setting in settings for word in ("-o", setting)]
+    _run(["apt-get", "-q", *options, "update"], folder, f"Debian's release {release}")
+    return options
+
+
+def _debian(package, root, options):
     def unpack(scratch):
-        _run(["apt-get", "-q", "download", package], scratch, f"Debian package {package}")
+        _run(["apt-get", "-q", *options, "download", package], scratch, f"Debian package {package}")
         for file in glob.glob(os.path.join(scratch, "*.deb")):
             _run(["dpkg", "-x", file, root], scratch, f"Debian package {package}")
 
@@ -107,14 +140,17 @@ def _wheel(package, root):
 def fetch(vendor, cache):
     """The folder that holds the vendor's compiler or the implementation, unpacked; raises Missing."""
     if vendor in APART:
-        cache = os.path.join(cache, vendor)
+        cache = os.path.join(cache, APART[vendor])
     root = os.path.join(cache, "root")
     os.makedirs(root, exist_ok=True)
     packages = list(DEBIAN.get(vendor, []))
     if vendor == "intel":
         packages += [package for package, path in UNLESS_PRESENT.items() if not os.path.exists(path)]
+    options = []
+    if vendor in RELEASES and not all(os.path.exists(_done(cache, package)) for package in packages):
+        options = _of_release(RELEASES[vendor], cache)
     for package in packages:
-        _once(cache, package, _debian(package, root))
+        _once(cache, package, _debian(package, root, options))
     for package in PYPI.get(vendor, []):
         _once(cache, package, _wheel(package, root))
     disassembler = f"{root}/{LIBRARIES}/libiga64.so"
