@@ -9,6 +9,7 @@
 #include <limits>
 #include <map>
 #include <ostream>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -108,7 +109,7 @@ inline bool is_one_subgroup(int lanes) {
   } catch (const DeviceError& refusal) {
     if (std::string_view(refusal.what()).find("subgroups of a packet") == std::string_view::npos)
       throw;
-    MESSAGE("Left out: ", refusal.what());
+    MESSAGE("Left out: ", std::string(refusal.what()));
     found->second = false;
   }
   return found->second;
