@@ -130,6 +130,13 @@ bool is_pocl(const std::string& platform) {
   return platform.find("Portable Computing Language") != std::string::npos;
 }
 
+std::string known_fault(const std::string& platform, const std::string& driver_version) {
+  // Loops end after 65 535 turns, and a box of a tree may stand in two places.
+  if (platform == "rusticl" && driver_version.starts_with("22."))
+    return fmt::format("Mesa {} computes wrongly, from 25.0 on it does not", driver_version);
+  return "";
+}
+
 std::string why_no_devices() { return why_no_devices(platform_names()); }
 
 std::string why_no_devices(const std::vector<std::string>& platforms) {

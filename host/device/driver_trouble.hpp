@@ -33,6 +33,10 @@ std::string why_no_devices();
 /// The same of the platforms that the loader finds, by their names.
 std::string why_no_devices(const std::vector<std::string>& platforms);
 
+/// What is known to be wrong in results of a platform's driver, for the end of a sentence on its
+/// device; empty when nothing is.
+std::string known_fault(const std::string& platform, const std::string& driver_version);
+
 /// What keeps the driver of a platform from compiling though the source is right, for the end of a
 /// sentence: a cache folder that cannot be written, too little memory. Empty when nothing is found.
 std::string driver_trouble(const std::string& platform);

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cstdlib>
 #include <string_view>
+#include <utility>
 
 #include "device/cl.hpp"
 #include "device/container_memory.hpp"
@@ -59,6 +60,8 @@ std::vector<std::string> problems_of(const cl::Device& device, const DeviceInfo&
     problems.push_back(fmt::format("its largest buffer is {} MiB, {} MiB are needed",
                                    info.max_allocation >> 20, kMinAllocation >> 20));
   }
+  if (std::string fault = known_fault(info.platform, info.driver_version); !fault.empty())
+    problems.push_back(std::move(fault));
   return problems;
 }
 

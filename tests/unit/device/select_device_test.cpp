@@ -105,6 +105,13 @@ TEST_CASE("context: a device that has gone is refused") {
   CHECK_THROWS_AS(Context{info}, DeviceError);
 }
 
+TEST_CASE("releases of Mesa that compute wrongly are known") {
+  CHECK(known_fault("rusticl", "22.3.6") ==
+        "Mesa 22.3.6 computes wrongly, from 25.0 on it does not");
+  CHECK(known_fault("rusticl", "25.0.7-2+deb13u1").empty());
+  CHECK(known_fault("Clover", "22.3.6").empty());
+}
+
 TEST_CASE("where Mesa alone offers no device the variable that it heeds is named") {
   CHECK(test::contains(why_no_devices({"rusticl", "Clover"}), "set RUSTICL_ENABLE to the driver"));
   CHECK_FALSE(test::contains(why_no_devices({"Clover"}), "RUSTICL_ENABLE"));
