@@ -107,17 +107,6 @@ std::vector<Camera> along(const RenderFlags& options, const std::vector<Camera>&
   return cameras;
 }
 
-/// The cameras of the run's photos where the model is a run's; none, with a warning, if their file
-/// is damaged.
-std::vector<Camera> trained_cameras(const ModelSource& source) {
-  try {
-    return run_cameras(source);
-  } catch (const DataError& error) {
-    spdlog::warn("the orbit knows no photos of the run: {}", error.what());
-    return {};
-  }
-}
-
 // A circle leaves rooms through their walls, and goes behind what was taken from one side.
 void warn_of_unseen(const std::vector<Camera>& frames,
                     const std::vector<Camera>& photos,
@@ -129,9 +118,8 @@ void warn_of_unseen(const std::vector<Camera>& frames,
   if (unseen * kUsualOneIn <= frames.size()) return;
   spdlog::warn(
       "{} of {} frames of the orbit look from where no photo was taken, as through walls: what "
-      "they "
-      "show is a guess; --interpolate N (or --ellipse N, --spiral N) with --data stays with the "
-      "photos",
+      "they show is a guess; --interpolate N (or --ellipse N, --spiral N) with --data stays with "
+      "the photos",
       unseen, frames.size());
 }
 
@@ -205,9 +193,9 @@ RenderViews render_views(const RenderFlags& options,
   RenderViews views;
   views.closed = options.orbit || options.ellipse || options.spiral;
   if (options.orbit) {
-    const bool given = !options.data.data.empty();
-    views.cameras =
-        orbit(options, model, given ? cameras_of(dataset, Split::kAll) : trained_cameras(source));
+    views.cameras = orbit(options, model,
+                          options.data.data.empty() ? readable_run_cameras(source, "the orbit")
+                                                    : cameras_of(dataset, Split::kAll));
   } else if (options.ellipse || options.spiral || options.interpolate) {
     views.cameras = along(options, cameras_of(dataset, Split::kAll));
   } else {

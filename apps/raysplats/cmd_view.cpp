@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <spdlog/spdlog.h>
 
 #include <array>
 #include <cstdio>
@@ -58,17 +57,6 @@ std::vector<View> views_of(const Options& options, const Dataset& dataset) {
   return views;
 }
 
-/// The cameras that the model was trained from, where it is a run's; none, with a warning, if their
-/// file is damaged.
-std::vector<Camera> trained_cameras(const ModelSource& source) {
-  try {
-    return run_cameras(source);
-  } catch (const DataError& error) {
-    spdlog::warn("the page has no cameras of the run: {}", error.what());
-    return {};
-  }
-}
-
 std::vector<Camera> cameras_of(const Options& options,
                                const std::vector<View>& views,
                                const ModelSource& source) {
@@ -77,7 +65,7 @@ std::vector<Camera> cameras_of(const Options& options,
     return io::read_model_cameras(options.cameras,
                                   {source.origin[0], source.origin[1], source.origin[2]});
   }
-  if (options.data.data.empty()) return trained_cameras(source);
+  if (options.data.data.empty()) return readable_run_cameras(source, "the page");
   cameras.reserve(views.size());
   for (const View& each : views) cameras.push_back(each.camera);
   return cameras;

@@ -13,4 +13,7 @@ namespace raysplats {
 /// that file. Throws DataError for a damaged one.
 std::vector<Camera> run_cameras(const ModelSource& source);
 
+/// The same, but none of a damaged file: a warning says that `asker` ("the page") has none.
+std::vector<Camera> readable_run_cameras(const ModelSource& source, const char* asker);
+
 }  // namespace raysplats

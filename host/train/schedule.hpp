@@ -14,8 +14,8 @@ namespace raysplats {
 /// What changes with the iteration, as pure functions of it, so that a resumed run continues
 /// exactly. Iterations are counted from 0: the first step of a run is iteration 0.
 
-/// Iterations of a run on so many training photos that does not say how long it is to be: 100 passes
-/// over the photos, from 1000 to 10 000 iterations.
+/// Iterations of a run on so many training photos that does not say how long it is to be: 100
+/// passes over the photos, from 1000 to 10 000 iterations.
 std::int64_t usual_length(std::size_t photos);
 /// As the options give them, or the usual ones.
 std::int64_t run_length(const TrainOptions& options, std::size_t photos);

@@ -114,7 +114,7 @@ TEST_CASE("an orbit of a run goes as its photos do, and says where none was take
   CHECK(contains(succeed({"render", run, "--orbit", "1", "--width", "16", "-o", folder / "more",
                           "--log-level", "warn"})
                      .err,
-                 "knows no photos of the run"));
+                 "the orbit has no cameras of the run"));
 }
 
 TEST_CASE("ranges are the same on the command line, in [trace] and in configurations") {

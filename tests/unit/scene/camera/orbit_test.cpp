@@ -230,6 +230,7 @@ TEST_CASE("up is where photos straight down come from, whatever the lines of the
   CHECK(glm::dot(estimate_up(flight), glm::dvec3(0, 0, 1)) > 0.999);
   // Before a wall all look the same way too, and know what is up.
   std::vector<Camera> wall;
+  wall.reserve(9);
   for (int i = 0; i < 9; ++i)
     wall.push_back(look_at({0.1 * i, 0, 0}, {0.1 * i, 4, 0}, {0, 0, 1}, 60, 40, 50));
   CHECK(glm::dot(estimate_up(wall), glm::dvec3(0, 0, 1)) > 0.999);

@@ -209,6 +209,7 @@ TEST_CASE("a white wall without points is no part that lacks them") {
   };
   const std::vector<SmallPhoto> photos = photos_of_wall();
   std::vector<SmallPhoto> white;
+  white.reserve(photos.size());
   for (const SmallPhoto& photo : photos) white.push_back(photo_of(photo.camera, white_above));
   const PointCloud below = points_below(0.0);
   const double lacking = bare_share(below, photos), plain = bare_share(below, white);
