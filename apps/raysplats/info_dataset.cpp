@@ -66,6 +66,7 @@ Json describe(const Dataset& dataset) {
                                   [](const View& view) { return !view.mask_path.empty(); })},
           {"borders", std::count_if(dataset.views.begin(), dataset.views.end(),
                                     [](const View& view) { return view.border != nullptr; })},
+          {"ignored_areas", dataset.views.empty() ? 0 : dataset.views.front().ignored.size()},
           {"points", dataset.points.size()}};
 }
 
@@ -100,6 +101,9 @@ void print_dataset(const Json& dataset) {
   if (const auto borders = dataset["borders"].get<std::size_t>(); borders > 0) {
     fmt::print("black borders    {}: the same in all photos of a size, and do not count\n",
                counted(borders, "photo"));
+  }
+  if (const auto areas = dataset["ignored_areas"].get<std::size_t>(); areas > 0) {
+    fmt::print("ignored areas    {}: of all photos, and do not count\n", areas);
   }
   if (dataset["alpha_is_background"].get<bool>()) {
     fmt::print("transparency     photos are cut out: what is transparent is background\n");

@@ -179,8 +179,8 @@ void DataFlags::check_used(bool orbit) const {
   }
   if (orbit && data.empty() && settings.has("downscale")) {
     throw UsageError(
-        "--downscale divides the sizes of photos, and this orbit has none: give --width and "
-        "--height");
+        "--downscale divides the sizes of a data set's photos, and this orbit has no --data: give "
+        "--width and --height");
   }
 }
 

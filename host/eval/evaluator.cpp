@@ -270,13 +270,14 @@ class Evaluation {
     }
     if (out.images.empty() && stopped_) return out;
     if (out.images.empty()) {
-      throw DataError(
-          fmt::format("No view of {} has a pixel to compare: their masks or lenses leave none",
-                      dataset_.root.string()));
+      throw DataError(fmt::format(
+          "No view of {} has a pixel to compare: their masks, lenses or ignore-areas leave none",
+          dataset_.root.string()));
     }
     if (empty > 0 && ranks_.leads()) {
       spdlog::warn(
-          "{} of {} views cannot be compared, {} among them: their masks or lenses leave no pixel",
+          "{} of {} views cannot be compared, {} among them: their masks, lenses or ignore-areas "
+          "leave no pixel",
           empty, all_.size(), first_empty);
     }
     out.mean = mean_of(out.images);

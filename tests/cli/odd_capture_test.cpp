@@ -188,7 +188,7 @@ TEST_CASE(
   for (const char* const init : {"auto", "random"}) {
     CAPTURE(init);
     check_refusal(train(data, folder / init, {"-q", "--init", init}), 2,
-                  "masks or transparent pixels leave 0 % of the photos");
+                  "masks, areas or transparent pixels leave 0 % of the photos");
     CHECK(!fs::exists(folder / init));
   }
 }

@@ -90,8 +90,7 @@ void add_ignore_areas_option(OptionTable& table, DatasetOptions& options) {
   table.add(
       "ignore-areas",
       "boxes of the photos that count neither in the loss nor in metrics, such as a logo or a "
-      "date: "
-      "left, top, right and bottom of each, in shares of width and height from the top left",
+      "date: left, top, right and bottom of each, in shares of width and height from the top left",
       [&options](const OptionTable::Values& values) {
         const std::vector<std::string> parts = option_items("ignore-areas", values);
         if (parts.size() % kNumbers != 0) {
@@ -114,7 +113,8 @@ void add_ignore_areas_option(OptionTable& table, DatasetOptions& options) {
         for (const PhotoArea& area : options.ignore_areas)
           numbers.insert(numbers.end(), {area.left, area.top, area.right, area.bottom});
         return fmt::format("[{}]", fmt::join(numbers, ", "));
-      });
+      },
+      OptionRow::List::kNumbers);
 }
 
 void add_origin_option(OptionTable& table, DatasetOptions& options) {

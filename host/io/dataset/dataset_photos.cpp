@@ -14,6 +14,7 @@
 #include "io/photo/photo_mask.hpp"
 #include "io/photo/photo_transparency.hpp"
 #include "raysplats/error.hpp"
+#include "util/number_text.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -70,9 +71,9 @@ void leave_out_areas(Dataset& dataset, const std::vector<PhotoArea>& areas) {
   if (dataset.alpha_is_background) {
     throw UsageError(
         "The option 'ignore-areas' is for photos that show a scene all over, but these are cut "
-        "out: "
-        "make what is in the areas transparent, or leave it out by masks");
+        "out: make what is in the areas transparent, or leave it out by masks");
   }
+  spdlog::info("{} of all photos do not count (ignore-areas)", counted(areas.size(), "area"));
   for (View& view : dataset.views) view.ignored = areas;
 }
 

@@ -126,8 +126,10 @@ class RowsWithoutAreas : public PhotoPixels {
   RowsWithoutAreas(std::unique_ptr<PhotoPixels> source, std::span<const PhotoArea> areas)
       : PhotoPixels(source->width(), source->height()), source_(std::move(source)) {
     for (const PhotoArea& area : areas) {
-      boxes_.push_back({{std::floor(area.left * width()), std::floor(area.top * height())},
-                        {std::ceil(area.right * width()), std::ceil(area.bottom * height())}});
+      const auto pixels = [](double share, int side) { return std::clamp(share, 0.0, 1.0) * side; };
+      boxes_.push_back(
+          {{std::floor(pixels(area.left, width())), std::floor(pixels(area.top, height()))},
+           {std::ceil(pixels(area.right, width())), std::ceil(pixels(area.bottom, height()))}});
     }
   }
 

@@ -20,6 +20,8 @@ constexpr std::uint64_t kCarveStream = 0x6361727665;
 constexpr std::uint64_t kScatterStream = 0x73636174746572;
 constexpr std::size_t kTriesPerPoint = 200;
 
+constexpr std::size_t kLeastLooks = 4;     // photos, for masks to tell of a place
+constexpr double kLeastCounted = 0.5;      // of them, for its points to be trained
 constexpr std::size_t kColourPhotos = 24;  // that tell the colour of a scattered point
 
 // Whether the photo shows something at the point or next to it.
@@ -113,7 +115,8 @@ PointCloud counted_points(const PointCloud& points, std::span<const SmallPhoto> 
       ++looked;
       counted += photo.known(*point) && photo.at(*point).w >= 0.5 ? 1 : 0;
     }
-    return 2 * counted >= looked;
+    return looked < kLeastLooks ||
+           static_cast<double>(counted) >= kLeastCounted * static_cast<double>(looked);
   });
 }
 

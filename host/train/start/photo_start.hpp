@@ -28,8 +28,8 @@ PointCloud carved_points(std::span<const SmallPhoto> photos,
 /// Points that none of `photos` sees are left out, so these have to be all.
 PointCloud hull_points(const PointCloud& points, std::span<const SmallPhoto> photos);
 
-/// Those of a data set's points that masks leave: most of the photos that see a point's place count
-/// there, or none sees it.
+/// A data set's points but for those that masks hide: at least four photos see a point's place, and
+/// less than half of them count there. Masks of what moves hide a place in a few photos alone.
 PointCloud counted_points(const PointCloud& points, std::span<const SmallPhoto> photos);
 
 /// Points in random places, half of them evenly in `region`, half on the rays of random pixels of

@@ -106,6 +106,13 @@ std::string match_text(const PointMatch& match) {
   return out;
 }
 
+// Whether masks or areas let a part of the photos not count.
+bool leaves_out_parts(const Dataset& dataset) {
+  return std::any_of(dataset.views.begin(), dataset.views.end(), [](const View& view) {
+    return !view.mask_path.empty() || !view.ignored.empty();
+  });
+}
+
 // The data set's points to start from: none where a start is free to do without and the photos show
 // something else. `count`: of points that photos would give.
 PointCloud start_points(const Dataset& dataset,
@@ -123,11 +130,11 @@ PointCloud start_points(const Dataset& dataset,
                    reliable.size() - hull.size(), reliable.size());
     }
     reliable = std::move(hull);
-  } else if (options.init == "auto") {
-    // No photo tells what becomes of a Gaussian that masks hide: it would stay as it began.
-    PointCloud counted = counted_points(reliable, photos(PhotoChoice::kSome));
+  } else if (options.init == "auto" && leaves_out_parts(dataset)) {
+    // Few photos tell what becomes of a Gaussian that masks hide: it would stay much as it began.
+    PointCloud counted = counted_points(reliable, photos(PhotoChoice::kMany));
     if (counted.size() < reliable.size()) {
-      spdlog::info("{} of {} sparse points lie where most photos do not count",
+      spdlog::info("{} of {} sparse points lie where few photos count",
                    reliable.size() - counted.size(), reliable.size());
     }
     reliable = std::move(counted);

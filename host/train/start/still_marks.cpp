@@ -184,22 +184,34 @@ std::vector<SmallPhoto> of_one_size(std::span<const SmallPhoto> photos) {
       ->second;
 }
 
+// Where a photo shows what a picture of it shows at a place, in shares of its sides.
+std::optional<glm::dvec2> share_seen(const Camera& picture,
+                                     const glm::dvec2& place,
+                                     const Camera& photo) {
+  const CameraRay ray = camera_ray(picture, place.x, place.y);
+  if (!ray.valid) return std::nullopt;
+  const auto seen = project(photo, ray.origin + ray.direction);
+  return seen ? std::optional(*seen / glm::dvec2(photo.width, photo.height)) : std::nullopt;
+}
+
 }  // namespace
 
 PhotoArea area_of(const StillMark& mark, const Camera& picture, const Camera& photo) {
-  const glm::dvec2 low = glm::dvec2(mark.low) - kRim, high = glm::dvec2(mark.high + 1) + kRim;
-  const glm::dvec2 size(photo.width, photo.height);
+  const glm::dvec2 picture_size(picture.width, picture.height);
+  const glm::dvec2 low = glm::max(glm::dvec2(mark.low) - kRim, 0.0);
+  const glm::dvec2 high = glm::min(glm::dvec2(mark.high + 1) + kRim, picture_size);
+  // No lens comes between panoramas, whose edges all lie in one place.
+  const bool around = picture.model == CameraModel::kEquirectangular;
   glm::dvec2 least(1.0), most(0.0);
   // A lens bends the sides of the box.
   for (int i = 0; i <= kSteps; ++i) {
     for (int j = 0; j <= kSteps; ++j) {
       const glm::dvec2 place = glm::mix(low, high, glm::dvec2(i, j) / double{kSteps});
-      const CameraRay ray = camera_ray(picture, place.x, place.y);
-      if (!ray.valid) continue;
-      const auto seen = project(photo, ray.origin + ray.direction);
+      const auto seen =
+          around ? std::optional(place / picture_size) : share_seen(picture, place, photo);
       if (!seen) continue;
-      least = glm::min(least, *seen / size);
-      most = glm::max(most, *seen / size);
+      least = glm::min(least, *seen);
+      most = glm::max(most, *seen);
     }
   }
   if (!(least.x < most.x && least.y < most.y)) return {};

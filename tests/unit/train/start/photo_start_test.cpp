@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec4.hpp>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "scene/camera/camera_model.hpp"
@@ -131,8 +132,16 @@ TEST_CASE("points that masks hide from most photos are left out of a start") {
   const PointCloud counted = counted_points(points, photos);
   REQUIRE(counted.size() == 3);
   CHECK(counted.positions[8] == 900.0f);
+  // Three photos are too few, and what hides a place in some of them hides no point.
+  CHECK(counted_points(points, std::span(photos).first(3)).size() == 5);
+  for (std::size_t i = 0; i < photos.size(); i += 2)
+    photos[i] = photo_of(cameras[i], [](const CameraRay&) { return glm::dvec4(0.5, 0.5, 0.5, 1); });
+  CHECK(counted_points(points, photos).size() == 5);
+  for (std::size_t i = 0; i < photos.size(); i += 2) photos[i] = photo_of(cameras[i], masked);
   // As a start takes them.
   Dataset dataset;
+  dataset.views.resize(1);
+  dataset.views[0].mask_path = "mask.png";
   CounterRng rng(3, 0);
   for (int i = 0; i < 3000; ++i) {
     const double far = i % 2 == 0 ? 0.25 : 1.5;

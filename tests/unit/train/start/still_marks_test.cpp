@@ -148,3 +148,17 @@ TEST_CASE("the area of a mark is that of the photo, whose lens may bend it") {
     }
   }
 }
+
+TEST_CASE("the area of a mark ends with the picture, panoramas too") {
+  const StillMark corner{{0, 280}, {59, 299}, 80, {kWidth, kHeight}};
+  Camera camera = around(1).front();
+  for (const CameraModel model : {CameraModel::kPinhole, CameraModel::kEquirectangular}) {
+    CAPTURE(static_cast<int>(model));
+    if (model == CameraModel::kEquirectangular) set_equirectangular(camera);
+    const PhotoArea area = area_of(corner, camera, camera);
+    CHECK(area.left == doctest::Approx(0.0));
+    CHECK(area.right == doctest::Approx(62.0 / kWidth).epsilon(0.003));
+    CHECK(area.top == doctest::Approx(278.0 / kHeight).epsilon(0.003));
+    CHECK(area.bottom == doctest::Approx(1.0));
+  }
+}
