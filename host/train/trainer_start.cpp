@@ -193,11 +193,10 @@ void note_unseen(const TrainOptions& options, std::size_t photos, ViewOrder orde
 
 // `shown`: the share of the photos that counts.
 [[noreturn]] void refuse_transparent(double shown) {
-  throw UsageError(
-      fmt::format("The first model has no Gaussians, because masks, areas or transparent pixels "
-                  "leave {:.2g} % of the "
-                  "photos: give masks that are white where photos count",
-                  100 * shown));
+  throw UsageError(fmt::format(
+      "The first model has no Gaussians, because masks, areas or transparent pixels leave {:.2g} % "
+      "of the photos: give masks that are white where photos count",
+      100 * shown));
 }
 
 // Iterations that were asked for by their number and that the run does not reach.
