@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <utility>
 
+#include "io/dataset/dataset_photos.hpp"
 #include "io/dataset/dataset_views.hpp"
 #include "run/former_metrics.hpp"
 #include "run/train_config.hpp"
@@ -127,21 +128,16 @@ std::vector<SmallPhoto> photos_for_marks(const Dataset& dataset,
   return load_small_photos(chosen, all, kMarkSide, progress);
 }
 
-// What to do about marks.
+// What to do about marks of the photo of a view.
 std::string without_marks(const Dataset& dataset,
                           std::span<const StillMark> marks,
                           const SmallPhoto& photo,
-                          const Camera& source) {
+                          const View& view) {
   if (dataset.alpha_is_background) return "leave it out by masks that are black there";
-  std::vector<double> numbers;
-  for (const PhotoArea& area :
-       dataset.read_as ? dataset.read_as->ignore_areas : std::vector<PhotoArea>())
-    numbers.insert(numbers.end(), {area.left, area.top, area.right, area.bottom});
-  for (const StillMark& mark : marks) {
-    const PhotoArea area = area_of(mark, photo.camera, source);
-    numbers.insert(numbers.end(), {area.left, area.top, area.right, area.bottom});
-  }
-  return fmt::format("leave it out by --ignore-areas {}", fmt::join(numbers, ","));
+  std::vector<PhotoArea> areas = view.ignored;
+  for (const StillMark& mark : marks)
+    areas.push_back(area_of(mark, photo.camera, view.source_camera));
+  return fmt::format("leave it out by --ignore-areas '{}'", io::text_of(areas));
 }
 
 // `views`: of which the photos are.
@@ -154,8 +150,7 @@ void warn_of_marks(const Dataset& dataset,
   const auto photo = std::find_if(read.begin(), read.end(), [&](const SmallPhoto& each) {
     return glm::ivec2(each.picture->width, each.picture->height) == mark.size;
   });
-  const Camera& source =
-      dataset.views[views[static_cast<std::size_t>(photo - read.begin())]].source_camera;
+  const View& view = dataset.views[views[static_cast<std::size_t>(photo - read.begin())]];
   const glm::dvec2 size(mark.size);
   const glm::dvec2 low = 100.0 * glm::dvec2(mark.low) / size;
   const glm::dvec2 high = 100.0 * glm::dvec2(mark.high + 1) / size;
@@ -165,7 +160,7 @@ void warn_of_marks(const Dataset& dataset,
       "their height (from the top left); it is learned as a part of the scene, so crop it off, or "
       "{}",
       marks.size() > 1 ? fmt::format("in {} places, the clearest ", marks.size()) : "", low.x,
-      high.x, low.y, high.y, without_marks(dataset, marks, *photo, source));
+      high.x, low.y, high.y, without_marks(dataset, marks, *photo, view));
 }
 
 // A length is the user's to choose, and that of a run by time nobody knows beforehand.

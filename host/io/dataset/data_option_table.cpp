@@ -108,12 +108,7 @@ void add_ignore_areas_option(OptionTable& table, DatasetOptions& options) {
         io::check_areas(areas);
         options.ignore_areas = std::move(areas);
       },
-      [&options] {
-        std::vector<double> numbers;
-        for (const PhotoArea& area : options.ignore_areas)
-          numbers.insert(numbers.end(), {area.left, area.top, area.right, area.bottom});
-        return fmt::format("[{}]", fmt::join(numbers, ", "));
-      },
+      [&options] { return fmt::format("[{}]", io::text_of(options.ignore_areas)); },
       OptionRow::List::kNumbers);
 }
 

@@ -2,6 +2,7 @@
 #include "io/dataset/dataset_photos.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -97,6 +98,13 @@ void check_areas(std::span<const PhotoArea> areas) {
         "width and height from 0 to 1, right above left and bottom above top",
         area.left, area.top, area.right, area.bottom));
   }
+}
+
+std::string text_of(std::span<const PhotoArea> areas) {
+  std::vector<double> numbers;
+  for (const PhotoArea& area : areas)
+    numbers.insert(numbers.end(), {area.left, area.top, area.right, area.bottom});
+  return fmt::format("{}", fmt::join(numbers, ", "));
 }
 
 void look_at_photos(Dataset& dataset, const DatasetOptions& options) {

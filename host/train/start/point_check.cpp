@@ -280,7 +280,10 @@ PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> phot
 }
 
 double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos) {
-  std::size_t shown = 0, bare = 0, even = 0, bare_even = 0;
+  struct Count {
+    std::size_t shown = 0, bare = 0;
+  };
+  Count textured, even;
   for (const SmallPhoto& photo : photos) {
     const int width = photo.camera.width, height = photo.camera.height;
     const int side = std::max(1, std::max(width, height) / kBareCells);
@@ -289,15 +292,14 @@ double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos) 
       for (double x = 0.5 * std::min(side, width); x < width; x += side) {
         const glm::dvec2 middle(x, y);
         if (!photo.known(middle) || photo.at(middle).w < 0.5) continue;
-        const std::size_t without = cells.taken(middle) ? 0 : 1;
-        const bool textured = is_textured(photo, middle, side);
-        (textured ? shown : even) += 1;
-        (textured ? bare : bare_even) += without;
+        Count& count = is_textured(photo, middle, side) ? textured : even;
+        ++count.shown;
+        count.bare += cells.taken(middle) ? 0 : 1;
       }
     }
   }
   // Photos without any texture tell no more than where points are.
-  if (shown == 0) shown = even, bare = bare_even;
+  const auto [shown, bare] = textured.shown > 0 ? textured : even;
   return shown > 0 ? static_cast<double>(bare) / static_cast<double>(shown) : 0;
 }
 

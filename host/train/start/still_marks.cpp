@@ -207,14 +207,12 @@ PhotoArea area_of(const StillMark& mark, const Camera& picture, const Camera& ph
   for (int i = 0; i <= kSteps; ++i) {
     for (int j = 0; j <= kSteps; ++j) {
       const glm::dvec2 place = glm::mix(low, high, glm::dvec2(i, j) / double{kSteps});
-      const auto seen =
-          around ? std::optional(place / picture_size) : share_seen(picture, place, photo);
-      if (!seen) continue;
-      least = glm::min(least, *seen);
-      most = glm::max(most, *seen);
+      const glm::dvec2 same = place / picture_size;
+      const glm::dvec2 seen = around ? same : share_seen(picture, place, photo).value_or(same);
+      least = glm::min(least, seen);
+      most = glm::max(most, seen);
     }
   }
-  if (!(least.x < most.x && least.y < most.y)) return {};
   constexpr double kParts = 1000, kRounding = 1e-6;
   least = glm::floor(glm::clamp(least, 0.0, 1.0) * kParts + kRounding) / kParts;
   most = glm::ceil(glm::clamp(most, 0.0, 1.0) * kParts - kRounding) / kParts;

@@ -30,8 +30,7 @@ struct StillMark {
 std::vector<StillMark> still_marks(std::span<const SmallPhoto> photos);
 
 /// The box of a photo on disk, taken by `photo`, that holds a mark of its pictures, which `picture`
-/// has taken (of StillMark::size), with a rim for what is faint; all of its width or height where
-/// the lens sees no end. In thousandths.
+/// has taken (of StillMark::size), with a rim for what is faint. In thousandths of its sides.
 PhotoArea area_of(const StillMark& mark, const Camera& picture, const Camera& photo);
 
 }  // namespace raysplats

@@ -148,7 +148,7 @@ TEST_CASE("a run is warned of what stands at the same pixels of all photos, and 
   CHECK(
       capture.says("from 68 to 95 % of their width and from 79 to 91 % of their height", options));
   const std::vector<PhotoArea> areas{{0.65, 0.77, 0.975, 0.93}};
-  CHECK(capture.says("--ignore-areas 0.65,0.77,0.975,0.93", options));
+  CHECK(capture.says("--ignore-areas '0.65, 0.77, 0.975, 0.93'", options));
   for (View& view : capture.dataset.views) view.ignored = areas;
   CHECK_FALSE(capture.says("same pixels", options));
 }
