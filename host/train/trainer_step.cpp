@@ -67,7 +67,7 @@ void Trainer::Impl::enqueue_view(std::size_t slot) {
 
 // The views of a step, those of this rank with their gradients.
 void Trainer::Impl::enqueue_views() {
-  sum.begin(ranks, slots.size());
+  sum.begin(ranks, slots.size(), gaussians);
   reflected_rays = 0;
   for (std::size_t slot = 0; slot < slots.size(); ++slot) {
     slots[slot].view = order.at(turn_of(slot));

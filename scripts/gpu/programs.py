@@ -112,7 +112,7 @@ PROGRAMS = [
     ("parameter mean", "train/parameter_mean.cl", dict(SH_FLOATS=48)),
     ("mcmc", "train/mcmc.cl", dict(SIGMOID_SCALE=0)),
     ("guard", "train/step_guard.cl", {}),
-    ("gradient tree", "train/gradient_tree.cl", {}),
+    ("gradient tree", "train/gradient_tree.cl", dict(SH_FLOATS=48)),
     ("view sizes", "trace/view_sizes.cl", {}),
     ("exposure", "train/exposure.cl", {}),
     ("exposure cut-outs", "train/exposure.cl", dict(CUT_OUT=1)),

@@ -6,10 +6,12 @@
 
 #include "device/row_download.hpp"
 #include "raysplats/error.hpp"
+#include "train/optimizer/group_parts.hpp"
 
 namespace raysplats {
 namespace {
 
+constexpr const char* kProgram = "train/gradient_tree.cl";
 constexpr std::size_t kGroup = 64;
 
 template <class Gradients, class Visit>
@@ -23,23 +25,28 @@ void for_each_buffer(Gradients& gradients, const Visit& visit) {
 
 // left += right, whose buffers are spare then.
 void GradientTree::join(StepGradients& left, StepGradients& right) {
-  Kernel add = context_.kernel("train/gradient_tree.cl", "add_numbers");
-  const auto join_numbers = [&add](const Buffer<float>& first, const Buffer<float>& second) {
-    add.launch(Range::linear(second.size(), kGroup), first, second, first,
-               static_cast<std::uint64_t>(second.size()));
-  };
-  for_each_group([&](ParameterGroup, const Buffer<float>& first,
-                     const Buffer<float>& second) { join_numbers(first, second); },
-                 left.gaussians, right.gaussians);
-  join_numbers(left.gaussians.screen, right.gaussians.screen);
-  if (right.sky.size() > 0) join_numbers(left.sky, right.sky);
+  BuildOptions build;
+  build.define("SH_FLOATS", group_width(ParameterGroup::kSh, sh_degree_));
+  if (count_ > 0) {
+    const GroupParts work = group_parts(count_, sh_degree_, kGroup);
+    context_.kernel(kProgram, "add_gradients", build)
+        .launch(work.range, u32(count_), work.parts, right.gaussians.arguments(),
+                left.gaussians.arguments());
+  }
+  if (right.sky.size() > 0) {
+    context_.kernel(kProgram, "add_numbers", build)
+        .launch(Range::linear(right.sky.size(), kGroup), right.sky, left.sky,
+                static_cast<std::uint64_t>(right.sky.size()));
+  }
   spare_.push_back(std::move(right));
 }
 
-void GradientTree::begin(Communicator& ranks, std::size_t slots) {
+void GradientTree::begin(Communicator& ranks, std::size_t slots, const DeviceGaussians& gaussians) {
   for (auto& part : sum_.take()) spare_.push_back(std::move(part.second));
   ranks_ = &ranks;
   slots_ = slots;
+  count_ = gaussians.count;
+  sh_degree_ = gaussians.sh_degree;
   wanted_ = ranks.size() > 1 ? SlotSum::nodes(slots, ranks.rank(), ranks.size())
                              : std::vector<PairwiseNode>();
   sent_ = 0;

@@ -29,9 +29,9 @@ class GradientTree {
  public:
   explicit GradientTree(Context& context) : context_(context) {}
 
-  /// All ranks: a sum of `slots` slots, of which each rank adds those of its RankShare. Forgets
-  /// what was added: a step that broke off, after wait().
-  void begin(Communicator& ranks, std::size_t slots);
+  /// All ranks: a sum of `slots` slots, of which each rank adds those of its RankShare, over the
+  /// parameters of `gaussians`. Forgets what was added: a step that broke off, after wait().
+  void begin(Communicator& ranks, std::size_t slots, const DeviceGaussians& gaussians);
   /// Takes the gradients of a slot, which follows the last one since begin(), and leaves buffers of
   /// an earlier one in their place. Enqueues without waiting; what is whole for other ranks goes to
   /// them while the device goes on (SlotSum).
@@ -49,6 +49,8 @@ class GradientTree {
   Context& context_;
   PairwiseSum<StepGradients> sum_;
   std::vector<StepGradients> spare_;  // buffers of sets that have been added
+  std::size_t count_ = 0;             // of Gaussians
+  int sh_degree_ = 0;
   // With several ranks.
   Communicator* ranks_ = nullptr;
   std::size_t slots_ = 0;

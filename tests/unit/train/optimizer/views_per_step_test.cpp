@@ -88,10 +88,13 @@ TEST_CASE("gradients of a step's views are added in a fixed tree, bit for bit [s
   Context context{test_device()};
   GradientTree tree(context);
   Communicator alone;
+  DeviceGaussians gaussians;
+  gaussians.count = kGaussians;
+  gaussians.sh_degree = kShDegree;
   StepGradients sum;
   for (const std::size_t views : {1u, 2u, 3u, 4u, 5u, 7u, 8u, 11u}) {
     CAPTURE(views);
-    tree.begin(alone, views);
+    tree.begin(alone, views, gaussians);
     for (std::size_t slot = 0; slot < views; ++slot) {
       fill(context, slot, sum);
       tree.add(slot, sum);
