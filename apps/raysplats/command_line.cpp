@@ -99,6 +99,12 @@ std::string taken_as_number(const CLI::App& command, const CLI::ParseError& erro
   return "";
 }
 
+std::string unknown(const std::string& what, const std::string& nearest, const std::string& help) {
+  return nearest.empty()
+             ? fmt::format("Unknown {}: '{}' lists all", what, help)
+             : fmt::format("Unknown {}: did you mean {}? '{}' lists all", what, nearest, help);
+}
+
 }  // namespace
 
 std::string command_line(int argc, const char* const* argv) {
@@ -108,13 +114,17 @@ std::string command_line(int argc, const char* const* argv) {
 }
 
 std::vector<std::string> own_arguments(int argc, const char* const* argv) {
-  // gsplat's and OpenSplat's names for what every trainer needs.
-  constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kForeign{
-      {{"--data_dir", "--data"},
+  // The names of 3DGS, gsplat, OpenSplat and nerfstudio for what every trainer needs.
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kForeign{
+      {{"--source_path", "--data"},
+       {"--model_path", "--output"},
+       {"--data_dir", "--data"},
        {"--result_dir", "--output"},
        {"--max_steps", "--iterations"},
+       {"--data_factor", "--downscale"},
        {"--num-iters", "--iterations"},
-       {"--data_factor", "--downscale"}}};
+       {"--max-num-iterations", "--iterations"},
+       {"--output-dir", "--output"}}};
   std::vector<std::string> arguments;
   for (int i = 1; i < argc; ++i) {
     std::string word = argv[i];
@@ -147,12 +157,10 @@ std::string explain(const CLI::ParseError& error, const CLI::App& app) {
       const std::string name = text.substr(0, text.find('='));
       std::vector<std::string> known = option_names(command);
       for (std::string& global : option_names(app)) known.push_back(std::move(global));
-      return fmt::format("Unknown option {}: did you mean {}? '{}' lists all", name,
-                         nearest_name(name, known), help);
+      return unknown("option " + name, nearest_name(name, known), help);
     }
     if (parsed.empty()) {
-      return fmt::format("Unknown command '{}': did you mean '{}'? '{}' lists all", text,
-                         nearest_name(text, command_names(app)), help);
+      return unknown("command " + text, nearest_name(text, command_names(app)), help);
     }
     return fmt::format("Unexpected argument '{}': '{}' shows what {} takes", text, help,
                        command.get_name());

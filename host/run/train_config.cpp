@@ -103,8 +103,8 @@ void read_keys(const toml::table& table,
     }
     if (key == keys.end() && take_retired_key(name)) continue;
     if (key == keys.end()) {
-      fail(fmt::format("unknown key '{}{}': did you mean '{}'?", prefix, written.str(),
-                       nearest_name(name, names_of(keys))));
+      fail(fmt::format("unknown key '{}{}'{}", prefix, written.str(),
+                       did_you_mean(name, names_of(keys), ": 'raysplats train -h' lists all")));
     }
     if (!seen.insert(name).second) fail(fmt::format("'{}' is there twice: leave one out", name));
     const std::optional<std::vector<std::string>> values = io::value_texts(node);

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "util/nearest_name.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <numeric>
 
 namespace raysplats {
 namespace {
+
+constexpr std::size_t kFew = 12;  // names that a message lists
 
 std::size_t levenshtein(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
@@ -26,7 +31,8 @@ std::size_t levenshtein(std::string_view a, std::string_view b) {
 
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates) {
   std::string best;
-  std::size_t distance = static_cast<std::size_t>(-1);
+  const std::size_t dashes = std::min(name.find_first_not_of('-'), name.size());
+  std::size_t distance = 2 + (name.size() - dashes) / 4;
   for (const std::string& candidate : candidates) {
     const std::size_t d = levenshtein(name, candidate);
     if (d < distance) {
@@ -35,6 +41,17 @@ std::string nearest_name(std::string_view name, const std::vector<std::string>& 
     }
   }
   return best;
+}
+
+std::string did_you_mean(std::string_view name,
+                         const std::vector<std::string>& candidates,
+                         const std::string& otherwise) {
+  const std::string nearest = nearest_name(name, candidates);
+  if (!nearest.empty()) return fmt::format(": did you mean '{}'?", nearest);
+  if (candidates.empty() || candidates.size() > kFew) return otherwise;
+  const auto last = candidates.end() - 1;
+  if (last == candidates.begin()) return fmt::format(": use '{}'", *last);
+  return fmt::format(": use '{}' or '{}'", fmt::join(candidates.begin(), last, "', '"), *last);
 }
 
 }  // namespace raysplats

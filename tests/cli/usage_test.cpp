@@ -7,8 +7,6 @@
 
 #include "program.hpp"
 
-namespace {}  // namespace
-
 TEST_CASE("help and version") {
   const Outcome help = raysplats_program({"--help"});
   CHECK(help.code == 0);
@@ -30,19 +28,38 @@ TEST_CASE("help of train lists the configuration keys and hides foreign names") 
        {"--iterations", "--ssim-weight", "--densify-grad-threshold", "--config", "--resume"}) {
     CHECK(contains(help.out, key));
   }
-  CHECK_FALSE(contains(help.out, "--max_steps"));
+  for (const char* foreign : {"--max_steps", "--source_path", "--output-dir"}) {
+    CHECK_FALSE(contains(help.out, foreign));
+  }
+}
+
+TEST_CASE("the names of other trainers for data, output and iterations are understood") {
+  for (const std::vector<std::string>& names :
+       std::vector<std::vector<std::string>>{{"--data_dir", "--result_dir", "--max_steps"},
+                                             {"--source_path", "--model_path", "--num-iters"},
+                                             {"--data", "--output-dir", "--max-num-iterations"}}) {
+    const Outcome result = raysplats_program(
+        {"train", names[0], "nowhere/data", names[1], "nowhere/run", names[2], "5"});
+    CAPTURE(result.err);
+    CHECK(result.code != 0);
+    CHECK(contains(result.err, "nowhere/data"));
+    CHECK_FALSE(contains(result.err, "option"));
+  }
 }
 
 TEST_CASE("a wrong command line is one sentence, exit code 2") {
   check_refused({}, 2, "No command given: use one of devices, ");
   CHECK_FALSE(contains(raysplats_program({}).err, "compile-kernels"));
   CHECK_FALSE(contains(raysplats_program({"compile-kernel"}).err, "compile-kernels"));
-  check_refused({"rendr"}, 2, "did you mean 'render'");
+  check_refused({"rendr"}, 2, "Unknown command rendr: did you mean render?");
+  check_refused({"gibberish"}, 2, "Unknown command gibberish: 'raysplats -h' lists all");
   check_refused({"render", "m.ply", "--backgroud", "1,1,1", "-o", "x", "--orbit", "3"}, 2,
                 "did you mean --background");
   check_refused({"render", "m.ply", "--loglevel=info", "-o", "x"}, 2, "did you mean --log-level");
   check_refused({"train", "data", "-o", "x", "--ssim-wieght", "0.1"}, 2,
                 "did you mean --ssim-weight");
+  check_refused({"train", "data", "-o", "x", "--epochs", "3"}, 2,
+                "Unknown option --epochs: 'raysplats train -h' lists all");
   check_refused({"train", "data", "-o", "x", "--time", "0"}, 2, "no time to train in");
   check_refused({"train", "data", "-o", "x", "--time", "soon"}, 2, "90s, 15m or 1.5h");
   check_refused({"train", "data", "-o", "x", "--time", "9s", "-n", "100"}, 2, "contradict");

@@ -60,8 +60,8 @@ void set_option(TrainOptions& options, std::string key, nb::handle value) {
     names.push_back(known.name);
   }
   if (take_retired_key(key)) return;
-  throw UsageError(
-      fmt::format("unknown option '{}': did you mean '{}'?", key, nearest_name(key, names)));
+  throw UsageError(fmt::format("unknown option '{}'{}", key,
+                               did_you_mean(key, names, ": 'raysplats train -h' lists all")));
 }
 
 std::string option_text(TrainOptions& options, std::string key) {
@@ -71,8 +71,8 @@ std::string option_text(TrainOptions& options, std::string key) {
     if (known.name == key) return known.text();
     names.push_back(known.name);
   }
-  throw UsageError(
-      fmt::format("unknown option '{}': did you mean '{}'?", key, nearest_name(key, names)));
+  throw UsageError(fmt::format("unknown option '{}'{}", key,
+                               did_you_mean(key, names, ": 'raysplats train -h' lists all")));
 }
 
 void make_options(TrainOptions* self,

@@ -277,11 +277,8 @@ void check_materials(const SceneFile& scene) {
   }
   const auto check = [&](const SceneMesh& mesh, const std::string& name) {
     if (std::find(names.begin(), names.end(), name) != names.end()) return;
-    throw UsageError(
-        names.empty()
-            ? fmt::format("{}: there is no [[material]] '{}' in this file", mesh.place, name)
-            : fmt::format("{}: there is no [[material]] '{}': did you mean '{}'?", mesh.place, name,
-                          nearest_name(name, names)));
+    throw UsageError(fmt::format("{}: there is no [[material]] '{}' in this file{}", mesh.place,
+                                 name, did_you_mean(name, names)));
   };
   for (const SceneMesh& mesh : scene.meshes) {
     if (!mesh.material.empty()) check(mesh, mesh.material);

@@ -91,9 +91,8 @@ std::vector<std::uint32_t> material_map(const SceneMesh& entry,
       used = true;
     }
     if (used) continue;
-    throw UsageError(fmt::format("{}: {} has no material '{}': did you mean '{}'?", entry.place,
-                                 entry.file.string(), from,
-                                 nearest_name(from, loaded.material_names)));
+    throw UsageError(fmt::format("{}: {} has no material '{}'{}", entry.place, entry.file.string(),
+                                 from, did_you_mean(from, loaded.material_names)));
   }
   return map;
 }

@@ -12,7 +12,9 @@ TEST_CASE("nearest name: misspellings find their name") {
   CHECK(nearest_name("quantil", names) == "quantile");
   CHECK(nearest_name("sed", names) == "seed");
   CHECK(nearest_name("seed", names) == "seed");
-  CHECK(nearest_name("degree-sh", names) != "");
+  CHECK(nearest_name("--max-hit", {"--max-hits", "--mask"}) == "--max-hits");
+  CHECK(nearest_name("epochs", names) == "");  // nothing that could be meant
+  CHECK(nearest_name("--run", {"--q"}) == "");
 }
 
 TEST_CASE("nearest name: edge cases") {
@@ -20,4 +22,16 @@ TEST_CASE("nearest name: edge cases") {
   CHECK(nearest_name("", {"abc", "a"}) == "a");
   CHECK(nearest_name("abc", {"", "xyz1"}) == "");
   CHECK(nearest_name("b", {"a", "c"}) == "a");  // the first of equals
+}
+
+TEST_CASE("did you mean: the nearest name, a few names, or what is said otherwise") {
+  const std::vector<std::string> few{"glass", "mirror", "wood"};
+  CHECK(did_you_mean("miror", few) == ": did you mean 'mirror'?");
+  CHECK(did_you_mean("concrete", few) == ": use 'glass', 'mirror' or 'wood'");
+  CHECK(did_you_mean("concrete", {"glass"}) == ": use 'glass'");
+  CHECK(did_you_mean("concrete", {}, ": there is none") == ": there is none");
+  std::vector<std::string> many(40, "another");
+  CHECK(did_you_mean("concrete", many, ": see the list") == ": see the list");
+  many.push_back("concert");
+  CHECK(did_you_mean("concrete", many) == ": did you mean 'concert'?");
 }
