@@ -3,6 +3,7 @@
 // their best values, the farther the larger the rates, and the mean lies nearer than most of them
 // (Polyak and Juditsky 1992; of networks: Izmailov et al. 2018).
 
+#include "trace/arguments.h"
 #include "train/parameter_groups.h"
 
 // All means move by `share` of their way to the parameters: 1 / (samples so far, this one
@@ -12,11 +13,7 @@ __kernel void add_sample(uint count,
                          float share,
                          const RsParts parts,
                          const __global uint* guard,
-                         const __global float* means,
-                         const __global float* quaternions,
-                         const __global float* scales,
-                         const __global float* opacities,
-                         const __global float* sh,
+                         RS_GAUSSIAN_ARGUMENTS,
                          __global float* mean_means,
                          __global float* mean_quaternions,
                          __global float* mean_scales,
