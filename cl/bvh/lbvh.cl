@@ -15,13 +15,7 @@ __kernel void merge_nodes(__global float* nodes,
   if (i >= (count + LANES - 1) / LANES * LANES) return;
   RsBox sum = box_empty();
   if (i < count) {
-    __global const float* from = nodes + (size_t)(source + i) * (RS_NODE_VECTORS * LANES);
-    for (int k = 0; k < LANES; ++k, ++from) {
-      RsBox child;
-      child.lo = (float4)(from[0], from[LANES], from[2 * LANES], 0.0f);
-      child.hi = (float4)(from[3 * LANES], from[4 * LANES], from[5 * LANES], 0.0f);
-      sum = box_union(sum, child);
-    }
+    for (uint k = 0; k < LANES; ++k) sum = box_union(sum, load_child(nodes, source + i, k));
   }
   store_child(nodes, target + i / LANES, i % LANES, sum);
 }

@@ -12,8 +12,20 @@
 #include "parallel/vector_lanes.h"
 #include "shared/tree_layout.h"
 
-// A node: lo.x lo.y lo.z hi.x hi.y hi.z of its children, one vector each (RS_NODE_VECTORS). Missing
-// children are empty boxes (lo > hi).
+// Without TRAIL the numbers of the LANES children of a node, and of the things in a leaf block, are
+// vectors. With TRAIL, where a ray tests one thing or two children at a time (GPUs), the numbers of
+// each lie together: a few reads of 16 bytes fetch them, and rays that wait for each other's reads
+// find all of one in the cache. RS_LANE_FLOAT is the place of number k of `numbers` in a lane.
+#if TRAIL
+#define RS_LANE_FLOAT(numbers, k, lane) ((lane) * (numbers) + (k))
+#else
+#define RS_LANE_FLOAT(numbers, k, lane) ((k)*LANES + (lane))
+#endif
+
+// A node: lo.x lo.y lo.z hi.x hi.y hi.z of its children (RS_NODE_VECTORS). Missing children are
+// empty boxes (lo > hi).
+#define RS_NODE_FLOAT(k, lane) RS_LANE_FLOAT(RS_NODE_VECTORS, k, lane)
+
 // A child of every level stays behind: LANES - 1 per level, and 2^31 things have 15 levels of 4 or
 // 7 of 16.
 #define RS_NODE_STACK 128
@@ -30,12 +42,11 @@ typedef union {
 } RayLanes;
 
 // What a ray tests at once of a leaf block: with TRAIL one lane of it, so that few numbers are
-// alive (GPUs), else all LANES. RS_BLOCK_VALUE is vector k of the block, or its lane.
+// alive, else all LANES.
 #if TRAIL
 #define RS_BLOCK_LANES 1
 typedef float bv;
 typedef int bi;
-#define RS_BLOCK_VALUE(block, k, lane) (((__global const float*)((block) + (k)))[lane])
 #define RS_BLOCK_MASK(comparison) (-(comparison))
 #define rs_block_any(mask) ((mask) != 0)
 #define rs_block_bits(mask) ((uint)((mask)&1))
@@ -43,7 +54,6 @@ typedef int bi;
 #define RS_BLOCK_LANES LANES
 typedef fv bv;
 typedef iv bi;
-#define RS_BLOCK_VALUE(block, k, lane) ((block)[k])
 #define RS_BLOCK_MASK(comparison) RS_MASK(comparison)
 #define rs_block_any(mask) rs_any(mask)
 #define rs_block_bits(mask) rs_lane_bits(mask)
@@ -114,15 +124,25 @@ RS_INLINE uint ray_meets_boxes(const RayData* ray,
   return rs_lane_bits(RS_MASK(near <= far));
 }
 
-// Writes box `lane` of a node.
+// Box `lane` of a node.
+RsBox load_child(__global const float* nodes, size_t node, uint lane) {
+  __global const float* from = nodes + node * (RS_NODE_VECTORS * LANES);
+  RsBox box;
+  box.lo = (float4)(from[RS_NODE_FLOAT(0, lane)], from[RS_NODE_FLOAT(1, lane)],
+                    from[RS_NODE_FLOAT(2, lane)], 0.0f);
+  box.hi = (float4)(from[RS_NODE_FLOAT(3, lane)], from[RS_NODE_FLOAT(4, lane)],
+                    from[RS_NODE_FLOAT(5, lane)], 0.0f);
+  return box;
+}
+
 void store_child(__global float* nodes, size_t node, uint lane, RsBox box) {
-  __global float* to = nodes + node * (RS_NODE_VECTORS * LANES) + lane;
-  to[0] = box.lo.x;
-  to[LANES] = box.lo.y;
-  to[2 * LANES] = box.lo.z;
-  to[3 * LANES] = box.hi.x;
-  to[4 * LANES] = box.hi.y;
-  to[5 * LANES] = box.hi.z;
+  __global float* to = nodes + node * (RS_NODE_VECTORS * LANES);
+  to[RS_NODE_FLOAT(0, lane)] = box.lo.x;
+  to[RS_NODE_FLOAT(1, lane)] = box.lo.y;
+  to[RS_NODE_FLOAT(2, lane)] = box.lo.z;
+  to[RS_NODE_FLOAT(3, lane)] = box.hi.x;
+  to[RS_NODE_FLOAT(4, lane)] = box.hi.y;
+  to[RS_NODE_FLOAT(5, lane)] = box.hi.z;
 }
 
 #endif

@@ -35,6 +35,7 @@ float group_sum(float own, __local float* scratch) {
   return own;
 }
 
+#if !TRAIL
 float node_area(__global const fv* node, __global const float* window) {
   const fv x = RS_CLIPPED_SIDE(node[0], node[3], 0);
   const fv y = RS_CLIPPED_SIDE(node[1], node[4], 1);
@@ -45,13 +46,24 @@ float node_area(__global const fv* node, __global const float* window) {
   return rs_lane_sum(select((fv)(0.0f), area, counts));
 }
 
-float box_area(__global const RsAabb* box, __global const float* window) {
-  const float x = RS_CLIPPED_SIDE(box->lo[0], box->hi[0], 0);
-  const float y = RS_CLIPPED_SIDE(box->lo[1], box->hi[1], 1);
-  const float z = RS_CLIPPED_SIDE(box->lo[2], box->hi[2], 2);
+#endif
+
+float box_area(const RsBox box, __global const float* window) {
+  const float x = RS_CLIPPED_SIDE(box.lo.x, box.hi.x, 0);
+  const float y = RS_CLIPPED_SIDE(box.lo.y, box.hi.y, 1);
+  const float z = RS_CLIPPED_SIDE(box.lo.z, box.hi.z, 2);
   const float area = x * y + y * z + z * x;
   return x >= 0.0f && y >= 0.0f && z >= 0.0f && area <= FLT_MAX ? area : 0.0f;
 }
+
+#if TRAIL
+float node_area(__global const fv* node, __global const float* window) {
+  float sum = 0.0f;
+  for (uint k = 0; k < LANES; ++k)
+    sum += box_area(load_child((__global const float*)node, 0, k), window);
+  return sum;
+}
+#endif
 
 // `window` is the grid that choose_grid made.
 __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void sum_node_areas(
@@ -87,7 +99,7 @@ __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void sum_box_areas(
   for (uint run = begin; run < end; run += RS_RUN * GROUP) {
     float part = 0.0f;
     for (uint i = run + get_local_id(0); i < min(run + RS_RUN * GROUP, end); i += GROUP)
-      part += box_area(boxes + i, window);
+      part += box_area(box_load(boxes, i), window);
     sum += part;
   }
   sum = group_sum(sum, scratch);

@@ -78,15 +78,12 @@ RS_INLINE uint4 children_by_depth(const RayData* ray, __global const fv* node, c
   uint4 keys = (uint4)(RS_NO_CHILD);
 #pragma unroll 1
   for (uint lane = 0; lane < LANES; lane += 2) {
-    __global const float2* planes = (__global const float2*)((__global const float*)node + lane);
-    const float2 x0 = planes[0], y0 = planes[2], z0 = planes[4];
-    const float2 x1 = planes[6], y1 = planes[8], z1 = planes[10];
-    const uint even =
-        child_key(ray, (float3)(x0.x, y0.x, z0.x), (float3)(x1.x, y1.x, z1.x), t_end, lane);
-    const uint odd =
-        child_key(ray, (float3)(x0.y, y0.y, z0.y), (float3)(x1.y, y1.y, z1.y), t_end, lane + 1);
+    __global const float4* two = node + RS_NODE_VECTORS / 2 * (lane / 2);
+    const float4 p = two[0], q = two[1], r = two[2];
     // Each to its place among those before it.
+    const uint even = child_key(ray, p.xyz, (float3)(p.w, q.xy), t_end, lane);
     keys = min(keys, (uint4)(even, max(keys.xyz, even)));
+    const uint odd = child_key(ray, (float3)(q.zw, r.x), r.yzw, t_end, lane + 1);
     keys = min(keys, (uint4)(odd, max(keys.xyz, odd)));
   }
   return keys;

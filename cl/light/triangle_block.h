@@ -11,11 +11,19 @@
 #include "shared/light_layout.h"
 #include "shared/tree_layout.h"
 
-// A block: x y z of the first, second and third corners, one vector each (NaN in lanes without a
-// triangle), then the indices of the triangles as bits.
+// A block: x y z of the first, second and third corners (NaN in lanes without a triangle), then the
+// indices of the triangles as bits.
 #define RS_TRIANGLE_INDEX 9
 #if RS_TRIANGLE_VECTORS != RS_TRIANGLE_INDEX + 1
 #error "the indices are the end of a block"
+#endif
+
+#define RS_TRIANGLE_FLOAT(k, lane) RS_LANE_FLOAT(RS_TRIANGLE_VECTORS, k, lane)
+#if TRAIL
+#define RS_TRIANGLE_VALUE(block, k, lane) \
+  (((__global const float*)(block))[RS_TRIANGLE_FLOAT(k, lane)])
+#else
+#define RS_TRIANGLE_VALUE(block, k, lane) ((block)[k])
 #endif
 
 // The ray's axes permuted so that z is the longest, and the shear that makes it (0, 0, 1).
@@ -73,15 +81,15 @@ RS_INLINE uint ray_meets_triangles(const ShearedRay* ray,
                                    float t_max,
                                    TriangleMeeting* meeting) {
   (void)lane;
-  const bv az = RS_BLOCK_VALUE(block, ray->z, lane) - ray->oz;
-  const bv bz = RS_BLOCK_VALUE(block, 3 + ray->z, lane) - ray->oz;
-  const bv cz = RS_BLOCK_VALUE(block, 6 + ray->z, lane) - ray->oz;
-  const bv ax = fma((bv)(-ray->sx), az, RS_BLOCK_VALUE(block, ray->x, lane) - ray->ox);
-  const bv bx = fma((bv)(-ray->sx), bz, RS_BLOCK_VALUE(block, 3 + ray->x, lane) - ray->ox);
-  const bv cx = fma((bv)(-ray->sx), cz, RS_BLOCK_VALUE(block, 6 + ray->x, lane) - ray->ox);
-  const bv ay = fma((bv)(-ray->sy), az, RS_BLOCK_VALUE(block, ray->y, lane) - ray->oy);
-  const bv by = fma((bv)(-ray->sy), bz, RS_BLOCK_VALUE(block, 3 + ray->y, lane) - ray->oy);
-  const bv cy = fma((bv)(-ray->sy), cz, RS_BLOCK_VALUE(block, 6 + ray->y, lane) - ray->oy);
+  const bv az = RS_TRIANGLE_VALUE(block, ray->z, lane) - ray->oz;
+  const bv bz = RS_TRIANGLE_VALUE(block, 3 + ray->z, lane) - ray->oz;
+  const bv cz = RS_TRIANGLE_VALUE(block, 6 + ray->z, lane) - ray->oz;
+  const bv ax = fma((bv)(-ray->sx), az, RS_TRIANGLE_VALUE(block, ray->x, lane) - ray->ox);
+  const bv bx = fma((bv)(-ray->sx), bz, RS_TRIANGLE_VALUE(block, 3 + ray->x, lane) - ray->ox);
+  const bv cx = fma((bv)(-ray->sx), cz, RS_TRIANGLE_VALUE(block, 6 + ray->x, lane) - ray->ox);
+  const bv ay = fma((bv)(-ray->sy), az, RS_TRIANGLE_VALUE(block, ray->y, lane) - ray->oy);
+  const bv by = fma((bv)(-ray->sy), bz, RS_TRIANGLE_VALUE(block, 3 + ray->y, lane) - ray->oy);
+  const bv cy = fma((bv)(-ray->sy), cz, RS_TRIANGLE_VALUE(block, 6 + ray->y, lane) - ray->oy);
   const bv a = difference_of_products(cx, by, cy, bx);
   const bv b = difference_of_products(ax, cy, ay, cx);
   const bv c = difference_of_products(bx, ay, by, ax);
@@ -102,7 +110,7 @@ RS_INLINE uint ray_meets_triangles(const ShearedRay* ray,
 }
 
 int triangle_index(__global const fv* block, uint lane) {
-  return ((__global const int*)(block + RS_TRIANGLE_INDEX))[lane];
+  return ((__global const int*)block)[RS_TRIANGLE_FLOAT(RS_TRIANGLE_INDEX, lane)];
 }
 
 #endif

@@ -34,12 +34,13 @@ __kernel void fill_triangles(const uint count,
   RsBox sum = box_empty();
   for (uint lane = 0; lane < LANES && (size_t)block * LANES < count; ++lane) {
     const size_t slot = (size_t)block * LANES + lane;
-    __global float* record = blocks + (size_t)block * (RS_TRIANGLE_VECTORS * LANES) + lane;
+    __global float* record = blocks + (size_t)block * (RS_TRIANGLE_VECTORS * LANES);
     const bool present = slot < count;
     const uint index = present ? order[slot] : 0;
     if (present) sum = box_union(sum, box_load_clean(boxes, index));
-    for (int k = 0; k < 9; ++k) record[k * LANES] = present ? corners[9 * (size_t)index + k] : NAN;
-    record[RS_TRIANGLE_INDEX * LANES] = as_float(present ? index : 0xffffffffu);
+    for (int k = 0; k < 9; ++k)
+      record[RS_TRIANGLE_FLOAT(k, lane)] = present ? corners[9 * (size_t)index + k] : NAN;
+    record[RS_TRIANGLE_FLOAT(RS_TRIANGLE_INDEX, lane)] = as_float(present ? index : 0xffffffffu);
   }
   store_child(nodes, block / LANES, block % LANES, sum);
 }

@@ -26,14 +26,23 @@
 // A block, all that its Gaussians need while they are traced in one place: the upper triangles
 // a b c d e f of their whitening matrices divided by sqrt(Q), which makes the confidence ellipsoid
 // the unit sphere, and the means (NaN where no ray may meet a Gaussian); Q / 2 with
-// ADAPTIVE_RADIUS; the opacities; the indices of the Gaussians as bits; then per lane the colour of
-// SH degree 0 and a zero.
-#define RS_BLOCK_OPACITY (9 + ADAPTIVE_RADIUS)
-#define RS_BLOCK_INDEX RS_GAUSSIAN_INDEX(ADAPTIVE_RADIUS)
+// ADAPTIVE_RADIUS or TRAIL; the opacities; the indices of the Gaussians as bits; then per lane the
+// colour of SH degree 0 and a zero. With TRAIL that is 64 bytes for each Gaussian, all in one line.
+#define RS_BLOCK_QUANTILES (ADAPTIVE_RADIUS || TRAIL ? 1 : 0)
+#define RS_BLOCK_OPACITY (9 + RS_BLOCK_QUANTILES)
+#define RS_BLOCK_INDEX RS_GAUSSIAN_INDEX(RS_BLOCK_QUANTILES)
 #define RS_BLOCK_COLOR (RS_BLOCK_INDEX + 1)
-#define RS_BLOCK_VECTORS RS_GAUSSIAN_VECTORS(ADAPTIVE_RADIUS)
+#define RS_BLOCK_VECTORS RS_GAUSSIAN_VECTORS(RS_BLOCK_QUANTILES)
 #if RS_BLOCK_VECTORS != RS_BLOCK_COLOR + 4 || RS_BLOCK_INDEX != RS_BLOCK_OPACITY + 1
 #error "the colours are the end of a block"
+#endif
+
+// Where number k of a lane lies in a block, and its colour.
+#define RS_BLOCK_FLOAT(k, lane) RS_LANE_FLOAT(RS_BLOCK_VECTORS, k, lane)
+#if TRAIL
+#define RS_BLOCK_COLOR_FLOAT(lane) RS_BLOCK_FLOAT(RS_BLOCK_COLOR, lane)
+#else
+#define RS_BLOCK_COLOR_FLOAT(lane) (RS_BLOCK_COLOR * LANES + 4 * (lane))
 #endif
 
 // How a ray passes the Gaussians of a block, in the space where they are unit spheres.
@@ -53,13 +62,16 @@ RS_INLINE uint ray_meets_block(const RayData* ray,
                                __global const fv* block,
                                const uint lane,
                                BlockMeeting* meeting) {
+#if TRAIL
+  __global const float4* record = block + RS_BLOCK_VECTORS / 4 * lane;
+  const float4 abcd = record[0], efxy = record[1];
+  const float a = abcd.x, b = abcd.y, c = abcd.z, d = abcd.w, e = efxy.x, f = efxy.y;
+  const float x = ray->o.x - efxy.z, y = ray->o.y - efxy.w, z = ray->o.z - record[2].x;
+#else
   (void)lane;
-  const bv a = RS_BLOCK_VALUE(block, 0, lane), b = RS_BLOCK_VALUE(block, 1, lane);
-  const bv c = RS_BLOCK_VALUE(block, 2, lane), d = RS_BLOCK_VALUE(block, 3, lane);
-  const bv e = RS_BLOCK_VALUE(block, 4, lane), f = RS_BLOCK_VALUE(block, 5, lane);
-  const bv x = ray->o.x - RS_BLOCK_VALUE(block, 6, lane);
-  const bv y = ray->o.y - RS_BLOCK_VALUE(block, 7, lane);
-  const bv z = ray->o.z - RS_BLOCK_VALUE(block, 8, lane);
+  const fv a = block[0], b = block[1], c = block[2], d = block[3], e = block[4], f = block[5];
+  const fv x = ray->o.x - block[6], y = ray->o.y - block[7], z = ray->o.z - block[8];
+#endif
   const bv ox = a * x + b * y + c * z, oy = d * y + e * z, oz = f * z;
   const bv dx = a * ray->d.x + b * ray->d.y + c * ray->d.z;
   const bv dy = d * ray->d.y + e * ray->d.z;
@@ -92,21 +104,28 @@ RS_INLINE uint ray_meets_block(const RayData* ray,
 }
 
 float block_opacity(__global const fv* block, uint lane) {
-  return ((__global const float*)(block + RS_BLOCK_OPACITY))[lane];
+  return ((__global const float*)block)[RS_BLOCK_FLOAT(RS_BLOCK_OPACITY, lane)];
 }
 
 #if ADAPTIVE_RADIUS
 float block_half_quantile(__global const fv* block, uint lane) {
-  return ((__global const float*)(block + 9))[lane];
+  return ((__global const float*)block)[RS_BLOCK_FLOAT(9, lane)];
 }
 #endif
 
 uint block_index(__global const fv* block, uint lane) {
-  return ((__global const uint*)(block + RS_BLOCK_INDEX))[lane];
+  return ((__global const uint*)block)[RS_BLOCK_FLOAT(RS_BLOCK_INDEX, lane)];
 }
 
 RS_INLINE float4 block_color(__global const fv* block, uint lane) {
-  return vload4(lane, (__global const float*)(block + RS_BLOCK_COLOR));
+  return vload4(0, (__global const float*)block + RS_BLOCK_COLOR_FLOAT(lane));
+}
+
+RS_INLINE float3 block_mean(__global const fv* block, uint lane) {
+  __global const float* numbers = (__global const float*)block;
+  return (float3)(numbers[RS_BLOCK_FLOAT(RS_GAUSSIAN_MEAN, lane)],
+                  numbers[RS_BLOCK_FLOAT(RS_GAUSSIAN_MEAN + 1, lane)],
+                  numbers[RS_BLOCK_FLOAT(RS_GAUSSIAN_MEAN + 2, lane)]);
 }
 
 #endif

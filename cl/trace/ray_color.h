@@ -73,10 +73,7 @@ RS_INLINE float4 color_direction(const RayScene* scene,
   float3 v = ray->d;
   if (scene->color_from_origin) {
     const uint slot = pending_slot(pending, k);
-    __global const float* mean =
-        (__global const float*)(scene->tree.blocks + slot / LANES * RS_BLOCK_VECTORS) +
-        RS_GAUSSIAN_MEAN * LANES + slot % LANES;
-    v = (float3)(mean[0], mean[LANES], mean[2 * LANES]) - ray->o;
+    v = block_mean(scene->tree.blocks + slot / LANES * RS_BLOCK_VECTORS, slot % LANES) - ray->o;
   }
   const float inverse = rsqrt(fmax(dot(v, v), 1e-38f));
   return (float4)(v * inverse, inverse);
@@ -140,9 +137,7 @@ RS_INLINE float4 hit_color(const RayScene* scene,
   float own_basis[25];
   const float* basis = ray_basis;
   if (scene->color_from_origin) {
-    __global const float* mean = (__global const float*)(blocks + slot / LANES * RS_BLOCK_VECTORS) +
-                                 RS_GAUSSIAN_MEAN * LANES + slot % LANES;
-    const float3 v = (float3)(mean[0], mean[LANES], mean[2 * LANES]) - ray->o;
+    const float3 v = block_mean(blocks + slot / LANES * RS_BLOCK_VECTORS, slot % LANES) - ray->o;
     const float3 n = v * rsqrt(fmax(dot(v, v), 1e-30f));
     rs_sh_basis(degree, n.x, n.y, n.z, own_basis);
     basis = own_basis;

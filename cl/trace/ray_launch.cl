@@ -28,9 +28,8 @@ __kernel void ray_keys(__global const RsRay* restrict rays,
   if (i >= count) return;
   const Ray raw = load_ray(rays, i);
   const RayData ray = ray_data(raw);
-  __global const float* box = nodes + (size_t)scene * (RS_NODE_VECTORS * LANES);
-  const float3 lo = (float3)(box[0], box[LANES], box[2 * LANES]);
-  const float3 hi = (float3)(box[3 * LANES], box[4 * LANES], box[5 * LANES]);
+  const RsBox box = load_child(nodes, scene, 0);
+  const float3 lo = box.lo.xyz, hi = box.hi.xyz;
   const float3 a = (lo - ray.o) * ray.inverse, b = (hi - ray.o) * ray.inverse;
   const float3 near = fmin(a, b), far = fmax(a, b);
   const float enter = fmax(fmax(near.x, near.y), fmax(near.z, ray.t_min));

@@ -101,8 +101,8 @@ __kernel void fill_blocks(const uint count,
       color = fmin(fmax(color, (float3)(0.0f)), (float3)(RS_MAX_COLOR));
     }
     __global float* record = blocks + (size_t)block * (RS_BLOCK_VECTORS * LANES);
-    for (int k = 0; k < RS_BLOCK_COLOR; ++k) record[k * LANES + lane] = v[k];
-    vstore4((float4)(color, 0.0f), lane, record + RS_BLOCK_COLOR * LANES);
+    for (int k = 0; k < RS_BLOCK_COLOR; ++k) record[RS_BLOCK_FLOAT(k, lane)] = v[k];
+    vstore4((float4)(color, 0.0f), 0, record + RS_BLOCK_COLOR_FLOAT(lane));
   }
   store_child(nodes, block / LANES, block % LANES, sum);
 }

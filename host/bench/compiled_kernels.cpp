@@ -16,7 +16,7 @@ const std::vector<CompiledKernel>& compiled_kernels() {
       {"gfx1100", "loss group: group_ssim_derivatives", 55, 12064, 256, 32},
       {"gfx1100", "loss group: group_gradient", 39, 13104, 256, 32},
       {"gfx1100", "adam sh3: adam_step", 20, 0, 64, 32},
-      {"gfx1100", "rays: trace_rays", 69, 7936, 64, 32},
+      {"gfx1100", "rays: trace_rays", 71, 7936, 64, 32},
       {"dg2-g10", "sort pairs: scatter", 128, 15424, 256, 16},
       {"dg2-g10", "prepare sh0: prepare_view", 128, 4096, 64, 16},
       {"dg2-g10", "lists: fill_tiles", 128, 0, 64, 16},

@@ -11,7 +11,6 @@ namespace {
 
 constexpr std::size_t kWave = 32;
 constexpr int kVectorLanes = 16;
-constexpr int kGroupLanes = 4;  // children of a node in the walk of GPUs
 constexpr int kGroupTile = 16;
 
 // The tiles that each form has by default on its own kind of device.
@@ -99,8 +98,10 @@ ExecutedCounts SceneBench::counts(bool grouped) {
   out.sort_passes = (16 + static_cast<int>(std::bit_width(tiles - 1)) + 7) / 8;
   CameraTracer tracer(self.context, trace);
   count_view(tracer, self.gaussians(), camera, out);
-  RayTracer rays(self.context, trace, grouped ? kGroupLanes : 0);
-  rays.count_work(grouped);
+  DeviceInfo device = self.context.device();
+  if (grouped) device.type = DeviceType::kGpu;
+  RayTracer rays(self.context, trace, tree_form(device));
+  rays.count_work();
   rays.update(self.gaussians());
   self.make_rays();
   count_rays(rays.trace(self.gaussians(), self.ray_list), out);

@@ -23,49 +23,52 @@ constexpr std::size_t kGroup = 64;
 // more private memory, or on GPUs more work-items.
 constexpr std::size_t kCpuOrderGroup = 256;
 constexpr std::size_t kOrderGroup = 64;
+constexpr int kTrailLanes = 4;
 constexpr std::size_t kMaxCount = std::size_t{1} << 31;
 
 std::size_t ceil_div(std::size_t a, std::size_t b) { return (a + b - 1) / b; }
 
 }  // namespace
 
-int ray_lanes(const DeviceInfo& device, int lanes) {
-  if (lanes == 0) {
-    lanes = 4;
-    while (device.type == DeviceType::kCpu && lanes < 16 &&
-           static_cast<std::uint32_t>(2 * lanes) <= device.float_vector_width)
-      lanes *= 2;
-  }
-  if (lanes != 4 && lanes != 8 && lanes != 16) {
-    throw UsageError(
-        fmt::format("Arbitrary rays cannot be traced with {} lanes: choose 4, 8 or 16", lanes));
-  }
-  return lanes;
+TreeForm tree_form(const DeviceInfo& device) {
+  if (device.type != DeviceType::kCpu) return {kTrailLanes, true};
+  TreeForm form;
+  while (form.lanes < 16 && static_cast<std::uint32_t>(2 * form.lanes) <= device.float_vector_width)
+    form.lanes *= 2;
+  return form;
 }
 
-Lbvh::Lbvh(Context& context, int lanes)
-    : Lbvh(context, lanes, ChunkShape::for_device(context.device())) {}
+BuildOptions tree_build(const TreeForm& form) {
+  return BuildOptions().define("LANES", form.lanes).define("TRAIL", form.trail ? 1 : 0);
+}
 
-Lbvh::Lbvh(Context& context, int lanes, const ChunkShape& shape)
-    : context_(&context),
-      lanes_(ray_lanes(context.device(), lanes)),
-      shape_(shape),
-      sort_(context, shape) {
+Lbvh::Lbvh(Context& context, const TreeForm& form)
+    : Lbvh(context, form, ChunkShape::for_device(context.device())) {}
+
+Lbvh::Lbvh(Context& context, const TreeForm& form, const ChunkShape& shape)
+    : context_(&context), form_(form), shape_(shape), sort_(context, shape) {
+  if (form.lanes != kTrailLanes && (form.trail || (form.lanes != 8 && form.lanes != 16))) {
+    throw UsageError(fmt::format("Arbitrary rays cannot be traced {} {} lanes: choose 4{}",
+                                 form.trail ? "by a trail with" : "with", form.lanes,
+                                 form.trail ? "" : ", 8 or 16"));
+  }
   grid_ = Buffer<float>(context, 14, "tree grid");
   too_long_ = Buffer<std::uint32_t>(context, 1, "tree flag");
 }
 
-std::size_t Lbvh::bytes_per_box(int lanes) {
+std::size_t Lbvh::bytes_per_box(const TreeForm& form) {
   // Code in two words and order. A node for every block but one in `lanes`.
-  const auto children = static_cast<std::size_t>(lanes - 1);
+  const auto children = static_cast<std::size_t>(form.lanes - 1);
   return 3 * sizeof(std::uint32_t) + RadixSort::kBytesPerPair +
          (RS_NODE_VECTORS * sizeof(float) + children - 1) / children;
 }
 
-std::size_t Lbvh::block_count() const { return ceil_div(count_, static_cast<std::size_t>(lanes_)); }
+std::size_t Lbvh::block_count() const {
+  return ceil_div(count_, static_cast<std::size_t>(form_.lanes));
+}
 
 std::size_t Lbvh::padded_blocks() const {
-  const auto lanes = static_cast<std::size_t>(lanes_);
+  const auto lanes = static_cast<std::size_t>(form_.lanes);
   return ceil_div(block_count(), lanes) * lanes;
 }
 
@@ -75,8 +78,9 @@ std::size_t Lbvh::order_group() const {
 
 Kernel Lbvh::kernel(std::string_view program, const char* name) const {
   // Only what a program reads: every other set of definitions is compiled again.
-  BuildOptions build;
-  build.define("LANES", lanes_);
+  BuildOptions build = program == kTree || program == kCost
+                           ? tree_build(form_)
+                           : BuildOptions().define("LANES", form_.lanes);
   if (program == kLeafOrder || program == kLeafOrderGroup) {
     build.define("GROUP", order_group());
   } else if (program != kTree) {
@@ -94,7 +98,7 @@ void Lbvh::order(const Buffer<RsAabb>& boxes, std::size_t count) {
   // Where this throws, the tree is empty.
   count_ = 0;
   level_sizes_.clear();
-  const auto lanes = static_cast<std::size_t>(lanes_);
+  const auto lanes = static_cast<std::size_t>(form_.lanes);
   std::vector<std::size_t> level_sizes;
   std::vector<std::uint32_t> begin{0};
   std::size_t nodes = 0;
@@ -115,7 +119,7 @@ void Lbvh::order(const Buffer<RsAabb>& boxes, std::size_t count) {
 }
 
 void Lbvh::sort_along_curve(const Buffer<RsAabb>& boxes, std::size_t count) {
-  const auto lanes = static_cast<std::size_t>(lanes_);
+  const auto lanes = static_cast<std::size_t>(form_.lanes);
   high_.ensure(*context_, count, "tree codes, high words");
   low_.ensure(*context_, count, "tree codes, low words");
   order_.ensure(*context_, count, "tree order");
@@ -157,7 +161,7 @@ void Lbvh::sort_along_curve(const Buffer<RsAabb>& boxes, std::size_t count) {
 }
 
 void Lbvh::merge() {
-  const auto lanes = static_cast<std::size_t>(lanes_);
+  const auto lanes = static_cast<std::size_t>(form_.lanes);
   Kernel merge = kernel(kTree, "merge_nodes");
   std::size_t source = 0;
   for (const std::size_t size : level_sizes_) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "device/buffer.hpp"
+#include "device/build_options.hpp"
 #include "device/context.hpp"
 #include "parallel/chunk_shape.hpp"
 #include "parallel/radix_sort.hpp"
@@ -15,10 +16,19 @@
 
 namespace raysplats {
 
-/// Lanes of the vectors that arbitrary rays are traced with: children of a node and things in a
-/// leaf block. `lanes` of 4, 8 or 16; 0 chooses the device's float vector width on CPUs (at least
-/// 4) and 4 elsewhere. Throws UsageError for other widths.
-int ray_lanes(const DeviceInfo& device, int lanes);
+/// How rays walk a tree, and how its numbers lie in memory for that (cl/bvh/lbvh_node.h).
+struct TreeForm {
+  int lanes = 4;       ///< children of a node and things in a leaf block: 4, 8 or 16
+  bool trail = false;  ///< one thing at a time, and no stack (TRAIL): for GPUs, of 4 lanes
+
+  bool operator==(const TreeForm&) const = default;
+};
+
+/// CPUs test all lanes at once, as many as their vectors of floats have (at least 4); others walk
+/// by a trail.
+TreeForm tree_form(const DeviceInfo& device);
+/// What kernels define that read or write nodes and blocks of such a tree.
+BuildOptions tree_build(const TreeForm& form);
 
 /// Linear bounding volume hierarchy over boxes (Lauterbach et al. 2009), made on the device and
 /// walked by all rays (cl/bvh/lbvh_node.h): boxes along a Hilbert curve (64-bit codes of their
@@ -31,12 +41,13 @@ int ray_lanes(const DeviceInfo& device, int lanes);
 /// children of level 1, padded_blocks() of them from node 0 on; merge(). A refit is the last two.
 class Lbvh {
  public:
-  Lbvh(Context& context, int lanes);
+  /// Throws UsageError for a form that there is not.
+  Lbvh(Context& context, const TreeForm& form);
   /// A tree with an explicit division of the work for ordering.
-  Lbvh(Context& context, int lanes, const ChunkShape& shape);
+  Lbvh(Context& context, const TreeForm& form, const ChunkShape& shape);
 
   /// What order() and merge() keep on the device for every box, beside the boxes and the blocks.
-  static std::size_t bytes_per_box(int lanes);
+  static std::size_t bytes_per_box(const TreeForm& form);
 
   /// Order and shape of the tree over boxes[0..count). Boxes that are empty or not finite come
   /// last. Throws UsageError for 2^31 boxes and when the buffer is shorter; whatever else it throws
@@ -53,7 +64,8 @@ class Lbvh {
   double cost(const Buffer<RsAabb>& boxes);
 
   std::size_t size() const { return count_; }
-  int lanes() const { return lanes_; }
+  const TreeForm& form() const { return form_; }
+  int lanes() const { return form_.lanes; }
   /// Positions along the curve that are ordered again together.
   std::size_t order_group() const;
   std::size_t block_count() const;
@@ -80,7 +92,7 @@ class Lbvh {
   Kernel kernel(std::string_view program, const char* name) const;
 
   Context* context_;
-  int lanes_;
+  TreeForm form_;
   ChunkShape shape_;
   RadixSort sort_;
   std::size_t count_ = 0;

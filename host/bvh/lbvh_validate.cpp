@@ -224,6 +224,7 @@ LbvhCopy LbvhCopy::of(const Lbvh& tree) {
   LbvhCopy out;
   out.count = tree.size();
   out.lanes = static_cast<std::size_t>(tree.lanes());
+  out.trail = tree.form().trail;
   out.group = tree.order_group();
   out.level_sizes = tree.level_sizes();
   if (out.count == 0) return out;
@@ -233,12 +234,17 @@ LbvhCopy LbvhCopy::of(const Lbvh& tree) {
   return out;
 }
 
+std::size_t LbvhCopy::at(std::size_t node, std::size_t k, std::size_t lane) const {
+  // RS_NODE_FLOAT of cl/bvh/lbvh_node.h.
+  const std::size_t of_child = trail ? lane * RS_NODE_VECTORS + k : k * lanes + lane;
+  return node * RS_NODE_VECTORS * lanes + of_child;
+}
+
 RsAabb LbvhCopy::child(std::size_t node, std::size_t lane) const {
   RsAabb box;
-  const std::size_t from = node * RS_NODE_VECTORS * lanes + lane;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    box.lo[axis] = nodes[from + axis * lanes];
-    box.hi[axis] = nodes[from + (3 + axis) * lanes];
+    box.lo[axis] = nodes[at(node, axis, lane)];
+    box.hi[axis] = nodes[at(node, 3 + axis, lane)];
   }
   return box;
 }

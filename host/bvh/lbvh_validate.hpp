@@ -23,6 +23,7 @@ std::vector<std::uint64_t> curve_codes(std::span<const RsAabb> boxes);
 struct LbvhCopy {
   std::size_t count = 0;
   std::size_t lanes = 0;
+  bool trail = false;                      ///< of its TreeForm
   std::size_t group = 0;                   ///< boxes ordered together
   std::vector<std::size_t> level_sizes;    ///< from level 1
   std::vector<std::uint32_t> level_begin;  ///< of level l at [l]
@@ -30,6 +31,8 @@ struct LbvhCopy {
   std::vector<float> nodes;
 
   static LbvhCopy of(const Lbvh& tree);
+  /// Place in `nodes` of number k of child `lane` of a node: least x y z, greatest x y z.
+  std::size_t at(std::size_t node, std::size_t k, std::size_t lane) const;
   /// Box of child `lane` of a node, numbered through all levels.
   RsAabb child(std::size_t node, std::size_t lane) const;
 };

@@ -48,15 +48,15 @@ bool has_glass(const Scene& scene) {
 
 }  // namespace
 
-std::size_t mesh_bytes(std::size_t triangles, int lanes) {
+std::size_t mesh_bytes(std::size_t triangles, const TreeForm& form) {
   constexpr std::size_t corners = 9 * kFloat;
   constexpr std::size_t attributes = kVertexBytes + sizeof(std::uint32_t) + kFloat;
   constexpr std::size_t block = RS_TRIANGLE_VECTORS * kFloat;
-  return triangles * (corners + attributes + sizeof(RsAabb) + block + Lbvh::bytes_per_box(lanes));
+  return triangles * (corners + attributes + sizeof(RsAabb) + block + Lbvh::bytes_per_box(form));
 }
 
 PathMemory::PathMemory(const Scene& scene, const DeviceInfo& device)
-    : device_(device), lanes_(ray_lanes(device, 0)) {
+    : device_(device), form_(tree_form(device)) {
   const std::size_t paths = has_glass(scene) ? kPathsThroughGlass : 1;
   pixel_ = kPixelBytes + paths * (kPathBytes + (scene.lights.empty() ? 0 : kShadowBytes));
   pixel_largest_ = 2 * paths * sizeof(RsPath);
@@ -68,8 +68,8 @@ PathMemory::PathMemory(const Scene& scene, const DeviceInfo& device)
   const std::size_t count = scene.gaussians.size();
   const std::size_t sh =
       3 * kFloat * static_cast<std::size_t>(sh_coefficients(scene.gaussians.sh_degree));
-  const std::size_t block = kFloat * RayTree::block_floats(scene.trace.adaptive_radius);
-  gaussians_ = count * (11 * kFloat + sh + sizeof(RsAabb) + block + Lbvh::bytes_per_box(lanes_));
+  const std::size_t block = kFloat * RayTree::block_floats(scene.trace, form_);
+  gaussians_ = count * (11 * kFloat + sh + sizeof(RsAabb) + block + Lbvh::bytes_per_box(form_));
   packets_ = count * (sizeof(RsLine) + sizeof(RsViewBounds) + sizeof(RsAabb) + 4) +
              MemoryShares(scene.trace, device).tile_lists();
   set_render(scene.render);
@@ -106,7 +106,7 @@ std::size_t PathMemory::paths(std::size_t pixels) const {
 }
 
 void PathMemory::set_meshes(std::size_t triangles) {
-  meshes_ = mesh_bytes(triangles, lanes_);
+  meshes_ = mesh_bytes(triangles, form_);
   largest_mesh_ = triangles * kVertexBytes;
 }
 

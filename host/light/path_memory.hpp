@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "bvh/lbvh.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/scene.hpp"
 
@@ -42,7 +43,7 @@ class PathMemory {
   std::size_t packet_bytes(std::size_t pixels) const;
 
   DeviceInfo device_;
-  int lanes_;
+  TreeForm form_;
   std::size_t batch_, pixel_, pixel_largest_;
   std::size_t packets_;
   bool one_point_ = false;  // all rays of a sample leave it
@@ -51,6 +52,6 @@ class PathMemory {
 };
 
 /// Of meshes with this many triangles: corners, attributes and the tree over them.
-std::size_t mesh_bytes(std::size_t triangles, int lanes);
+std::size_t mesh_bytes(std::size_t triangles, const TreeForm& form);
 
 }  // namespace raysplats

@@ -103,7 +103,7 @@ void store(Context& context, const std::vector<T>& values, const char* label, Bu
 SurfaceStore::SurfaceStore(Context& context, const Scene& scene)
     : context_(&context),
       kinds_(scene.materials),
-      triangles_(context, 0, scene.trace.launch_budget_ms) {
+      triangles_(context, scene.trace.launch_budget_ms) {
   std::vector<RsTexture> textures;
   std::vector<float> texels;
   for (const Image& image : scene.textures) {

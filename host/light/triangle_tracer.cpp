@@ -43,9 +43,12 @@ std::vector<float> corners_of(std::span<const Mesh> meshes) {
 
 }  // namespace
 
-TriangleTracer::TriangleTracer(Context& context, int lanes, double launch_budget_ms)
+TriangleTracer::TriangleTracer(Context& context, double launch_budget_ms)
+    : TriangleTracer(context, tree_form(context.device()), launch_budget_ms) {}
+
+TriangleTracer::TriangleTracer(Context& context, const TreeForm& form, double launch_budget_ms)
     : context_(&context),
-      tree_(context, lanes),
+      tree_(context, form),
       budget_(launch_budget_ms, context.device().type),
       no_skip_(context, 1, "no triangle to skip") {}
 
@@ -55,7 +58,7 @@ void TriangleTracer::build(std::span<const Mesh> meshes) {
   corners_.ensure(*context_, corners.size(), "triangles");
   corners_.upload(corners);
   boxes_.ensure(*context_, count, "triangle boxes");
-  const BuildOptions build = BuildOptions().define("LANES", tree_.lanes());
+  const BuildOptions build = tree_build(tree_.form());
   if (count > 0) {
     context_->kernel("light/triangle_blocks.cl", "triangle_bounds", build)
         .launch(Range::linear(count, kGroup), corners_, u32(count), boxes_);
@@ -77,13 +80,13 @@ template <class... Arguments>
 void TriangleTracer::launch_rays(const char* kernel,
                                  std::size_t count,
                                  const Arguments&... arguments) {
-  const bool cpu = context_->device().type == DeviceType::kCpu;
-  const std::size_t each = cpu ? kCpuRaysPerItem : 1;
-  launch_in_bands(*context_, budget_,
-                  context_->kernel("light/triangle_tracer.cl", kernel,
-                                   tree_walk_build(context_->device(), tree_.lanes())),
-                  (count + each - 1) / each, cpu ? 1 : kGroup, u32(count), u32(each),
-                  tree_.arguments(blocks_), arguments...);
+  const bool shares = shares_items(context_->device(), tree_.form());
+  const std::size_t each = shares ? kCpuRaysPerItem : 1;
+  launch_in_bands(
+      *context_, budget_,
+      context_->kernel("light/triangle_tracer.cl", kernel, tree_walk_build(tree_.form())),
+      (count + each - 1) / each, shares ? 1 : kGroup, u32(count), u32(each),
+      tree_.arguments(blocks_), arguments...);
 }
 
 template <class Skip>

@@ -20,9 +20,10 @@ namespace raysplats {
 /// Watertight: a ray through an edge or corner that triangles share meets at least one of them.
 class TriangleTracer {
  public:
-  /// `lanes` of 4, 8 or 16; 0 chooses by the device (ray_lanes()). `launch_budget_ms` as in
-  /// TraceOptions.
-  explicit TriangleTracer(Context& context, int lanes = 0, double launch_budget_ms = -1.0);
+  /// `launch_budget_ms` as in TraceOptions.
+  explicit TriangleTracer(Context& context, double launch_budget_ms = -1.0);
+  /// In another form than the device's tree_form(). Throws UsageError for one that there is not.
+  TriangleTracer(Context& context, const TreeForm& form, double launch_budget_ms = -1.0);
 
   /// Builds the tree. Degenerate triangles are never met. Throws DataError for a position that is
   /// not finite and an index out of range.

@@ -129,19 +129,18 @@ void RayBackward::add(const DeviceGaussians& gaussians,
     ray_gradients->clear();
   }
   if (count == 0 || gaussians.count == 0) return;
-  const DeviceInfo& device = context_->device();
   const TraceOptions& options = tracer_->options();
   const Lbvh& tree = tracer_->tree().tree();
-  const bool cpu = device.type == DeviceType::kCpu;
+  const bool shares = shares_items(context_->device(), tree.form());
   const bool ordered = order_.compute(tree, rays, count);
-  BuildOptions build = ray_walk_build(device, options, tracer_->near(), tree.lanes(), degree_);
+  BuildOptions build = ray_walk_build(tree.form(), options, tracer_->near(), degree_);
   sums_.define(build.define("SH_DEGREE", degree_)
                    .define("WITH_RAY_GRADIENT", ray_gradients != nullptr ? 1 : 0)
                    .define("RAISE_CLAMPED", options.raise_clamped ? 1 : 0));
-  const std::size_t chunk = cpu ? kCpuChunk : 1;
+  const std::size_t chunk = shares ? kCpuChunk : 1;
   // Rays that all work-items, or a group of them, take in one turn: bands of whole rows leave every
   // ray with the copy that it would go to without.
-  const std::size_t group = cpu ? 1 : kGroup;
+  const std::size_t group = shares ? 1 : kGroup;
   const std::size_t row = chunk * (sums_.is_private() ? sums_.copies() : group);
   const RsRayWalk walk = ray_walk(options, tracer_->near(), gaussians,
                                   color_direction == ColorDirection::kFromOrigin ? 1 : 0);

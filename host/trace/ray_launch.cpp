@@ -14,15 +14,8 @@ constexpr std::size_t kGroup = 64;
 // a group of 64 then takes 7.5 KiB, so that eight groups fit 64 KiB.
 constexpr int kRayHits = 256;
 constexpr int kKept = 10;
-// Lanes for which tree_walk.h has a trail.
-constexpr int kTrailLanes = 4;
 // Fewer rays than this share too little for a sort to pay.
 constexpr std::size_t kOrderedRays = 4096;
-
-// Private memory is dear on GPUs.
-bool keeps_trail(const DeviceInfo& device, int lanes) {
-  return device.type != DeviceType::kCpu && lanes == kTrailLanes;
-}
 
 }  // namespace
 
@@ -45,27 +38,26 @@ RayNear RayNear::of(const Camera& camera, float near_depth) {
   return out;
 }
 
-BuildOptions tree_walk_build(const DeviceInfo& device, int lanes) {
-  BuildOptions build = BuildOptions().define("LANES", lanes);
-  if (keeps_trail(device, lanes)) {
-    build.define("TRAIL", 1).define("GROUP", kGroup);
-  } else {
-    build.define("TRAIL", 0);
-  }
+bool shares_items(const DeviceInfo& device, const TreeForm& form) {
+  return device.type == DeviceType::kCpu && !form.trail;
+}
+
+BuildOptions tree_walk_build(const TreeForm& form) {
+  BuildOptions build = tree_build(form);
+  if (form.trail) build.define("GROUP", kGroup);
   return build;
 }
 
-BuildOptions ray_walk_build(const DeviceInfo& device,
+BuildOptions ray_walk_build(const TreeForm& form,
                             const TraceOptions& options,
                             const RayNear& near,
-                            int lanes,
                             int sh_degree) {
-  BuildOptions build = tree_walk_build(device, lanes);
+  BuildOptions build = tree_walk_build(form);
   build.define("NEAR_LIMIT", near.limited ? 1 : 0)
       .define("LENS", near.lens)
       .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
       .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0);
-  if (keeps_trail(device, lanes)) {
+  if (form.trail) {
     build.define("KEPT", kKept).define("SH_DEGREE", sh_degree);
   } else {
     build.define("RAY_HITS", kRayHits);
@@ -97,7 +89,7 @@ bool RayOrder::compute(const Lbvh& tree, const Buffer<Ray>& rays, std::size_t co
   if (count < kOrderedRays || tree.levels() == 0) return false;
   indices_.ensure(*context_, count, "ray order");
   keys_.ensure(*context_, count, "ray keys");
-  context_->kernel("trace/ray_launch.cl", "ray_keys", BuildOptions().define("LANES", tree.lanes()))
+  context_->kernel("trace/ray_launch.cl", "ray_keys", tree_build(tree.form()))
       .launch(Range::linear(count, kGroup), rays, static_cast<std::uint32_t>(count), tree.nodes(),
               tree.scene_node(), keys_, indices_);
   sort_.sort(keys_, indices_, count);

@@ -34,15 +34,18 @@ struct RayNear {
   static RayNear of(const Camera& camera, float near_depth);
 };
 
+/// Whether work-items take several rays each, in groups of one: on CPUs, which have private memory
+/// for the walk of one ray at a time, but where walks go by a trail.
+bool shares_items(const DeviceInfo& device, const TreeForm& form);
+
 /// Build options of a kernel that walks rays through an Lbvh (cl/bvh/tree_walk.h).
-BuildOptions tree_walk_build(const DeviceInfo& device, int lanes);
+BuildOptions tree_walk_build(const TreeForm& form);
 
 /// Build options of a kernel that walks rays through Gaussians (cl/trace/ray_walk.h), whose colours
 /// have `sh_degree`.
-BuildOptions ray_walk_build(const DeviceInfo& device,
+BuildOptions ray_walk_build(const TreeForm& form,
                             const TraceOptions& options,
                             const RayNear& near,
-                            int lanes,
                             int sh_degree);
 
 /// What all rays of a launch share. `color_from_origin` as in RsRayWalk.

@@ -32,10 +32,10 @@ std::int32_t color_mode(ColorDirection direction) {
 }  // namespace
 
 struct RayTracer::Impl {
-  Impl(Context& context_in, const TraceOptions& options_in, int lanes)
+  Impl(Context& context_in, const TraceOptions& options_in, const TreeForm& form)
       : context(context_in),
         options(options_in),
-        tree(context_in, options_in, lanes),
+        tree(context_in, options_in, form),
         order(context_in),
         budget(options_in.launch_budget_ms, context_in.device().type),
         no_flags(context_in, 1, "no flags of rays") {}
@@ -51,11 +51,12 @@ struct RayTracer::Impl {
   Buffer<Ray> rays;
   Buffer<RayResult> results;
   bool counts_work = false;
-  bool as_gpu = false;
 };
 
-RayTracer::RayTracer(Context& context, const TraceOptions& options, int lanes)
-    : impl_(std::make_unique<Impl>(context, options, lanes)) {}
+RayTracer::RayTracer(Context& context, const TraceOptions& options)
+    : RayTracer(context, options, tree_form(context.device())) {}
+RayTracer::RayTracer(Context& context, const TraceOptions& options, const TreeForm& form)
+    : impl_(std::make_unique<Impl>(context, options, form)) {}
 RayTracer::~RayTracer() = default;
 
 void RayTracer::update(const DeviceGaussians& gaussians) {
@@ -118,27 +119,22 @@ void RayTracer::launch(const DeviceGaussians& gaussians,
   }
   if (results.size() < count) results.ensure(self.context, count, "ray results");
   const TraceOptions& options = self.options;
-  DeviceInfo device = self.context.device();
-  if (self.as_gpu) device.type = DeviceType::kGpu;
-  const bool cpu = device.type == DeviceType::kCpu;
   const Lbvh& tree = self.tree.tree();
+  const bool shares = shares_items(self.context.device(), tree.form());
   const bool ordered = self.order.compute(tree, rays, count);
-  const std::size_t rays_per_item = cpu ? kCpuRaysPerItem : 1;
-  BuildOptions build =
-      ray_walk_build(device, options, self.near, tree.lanes(), gaussians.active_sh_degree);
+  const std::size_t rays_per_item = shares ? kCpuRaysPerItem : 1;
+  BuildOptions build = ray_walk_build(tree.form(), options, self.near, gaussians.active_sh_degree);
   if (self.counts_work) build.define("COUNT_WORK", 1);
   build.define("LEADING", color_mode == kFlagPerRay ? 1 : 0);
-  launch_in_bands(
-      self.context, self.budget, self.context.kernel("trace/ray_tracer.cl", "trace_rays", build),
-      (count + rays_per_item - 1) / rays_per_item, cpu ? 1 : kGroup, u32(count), u32(rays_per_item),
-      self.tree.arguments(), gaussians.sh, ray_walk(options, self.near, gaussians, color_mode),
-      self.order.arguments(rays, ordered), from_origin, results);
+  launch_in_bands(self.context, self.budget,
+                  self.context.kernel("trace/ray_tracer.cl", "trace_rays", build),
+                  (count + rays_per_item - 1) / rays_per_item, shares ? 1 : kGroup, u32(count),
+                  u32(rays_per_item), self.tree.arguments(), gaussians.sh,
+                  ray_walk(options, self.near, gaussians, color_mode),
+                  self.order.arguments(rays, ordered), from_origin, results);
 }
 
-void RayTracer::count_work(bool grouped) {
-  impl_->counts_work = true;
-  impl_->as_gpu = grouped;
-}
+void RayTracer::count_work() { impl_->counts_work = true; }
 
 void RayTracer::set_background(const std::array<float, 3>& background) {
   impl_->options.background = background;

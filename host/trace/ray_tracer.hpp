@@ -22,8 +22,9 @@ namespace raysplats {
 /// per ray; near_depth and depth of the options have no meaning here, but see set_near().
 class RayTracer {
  public:
-  /// `lanes` of 4, 8 or 16 vectors' lanes; 0 chooses by the device (ray_lanes()).
-  RayTracer(Context& context, const TraceOptions& options, int lanes = 0);
+  RayTracer(Context& context, const TraceOptions& options);
+  /// In another form than the device's tree_form(). Throws UsageError for one that there is not.
+  RayTracer(Context& context, const TraceOptions& options, const TreeForm& form);
   ~RayTracer();
 
   /// Builds the tree. It, refit() or follow() must come after every change of the Gaussians.
@@ -66,9 +67,8 @@ class RayTracer {
   /// Throws UsageError unless the tree is that of these Gaussians as they are now.
   void require_current(const DeviceGaussians& gaussians) const;
   /// Rays of the next trace() tell in place of their depths how many nodes (`depth`) and blocks
-  /// (`median_depth`) they tested, for the model of speed; with `grouped` by the walk of GPUs,
-  /// whose tree must have been made with 4 lanes.
-  void count_work(bool grouped);
+  /// (`median_depth`) they tested, for the model of speed.
+  void count_work();
   /// The tree of the last update() or refit().
   const RayTree& tree() const;
 

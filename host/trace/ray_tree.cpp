@@ -17,12 +17,12 @@ constexpr std::size_t kGroup = 64;
 
 }  // namespace
 
-std::size_t RayTree::block_floats(bool adaptive_radius) {
-  return RS_GAUSSIAN_VECTORS(adaptive_radius ? 1 : 0);
+std::size_t RayTree::block_floats(const TraceOptions& options, const TreeForm& form) {
+  return RS_GAUSSIAN_VECTORS(options.adaptive_radius || form.trail ? 1 : 0);
 }
 
-RayTree::RayTree(Context& context, const TraceOptions& options, int lanes)
-    : context_(&context), options_(options), tree_(context, lanes) {}
+RayTree::RayTree(Context& context, const TraceOptions& options, const TreeForm& form)
+    : context_(&context), options_(options), tree_(context, form) {}
 
 void RayTree::build(const DeviceGaussians& gaussians) {
   built_ = false;
@@ -30,7 +30,7 @@ void RayTree::build(const DeviceGaussians& gaussians) {
   tree_.order(boxes_, gaussians.count);
   blocks_.ensure(*context_,
                  tree_.block_count() * static_cast<std::size_t>(tree_.lanes()) *
-                     block_floats(options_.adaptive_radius),
+                     block_floats(options_, tree_.form()),
                  "ray blocks");
   fill(gaussians);
   built_cost_ = -1;
@@ -67,9 +67,8 @@ void RayTree::compute_boxes(const DeviceGaussians& gaussians) {
 
 void RayTree::fill(const DeviceGaussians& gaussians) {
   if (gaussians.count == 0) return;
-  BuildOptions build;
-  build.define("LANES", tree_.lanes())
-      .define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
+  BuildOptions build = tree_build(tree_.form());
+  build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
       .define("ADAPTIVE_RADIUS", options_.adaptive_radius ? 1 : 0);
   const std::size_t padded = tree_.padded_blocks();
   context_->kernel("trace/ray_tree.cl", "fill_blocks", build)

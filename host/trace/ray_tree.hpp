@@ -14,10 +14,10 @@ namespace raysplats {
 /// traced, in its leaf blocks (cl/trace/ray_block.h).
 class RayTree {
  public:
-  RayTree(Context& context, const TraceOptions& options, int lanes);
+  RayTree(Context& context, const TraceOptions& options, const TreeForm& form);
 
   /// Floats that a Gaussian has in its leaf block.
-  static std::size_t block_floats(bool adaptive_radius);
+  static std::size_t block_floats(const TraceOptions& options, const TreeForm& form);
 
   void build(const DeviceGaussians& gaussians);
   /// Follows Gaussians that changed but kept their number since build(). Throws UsageError

@@ -19,10 +19,6 @@ namespace {
 // Alphas about which the device may disagree whether any ray meets the Gaussian.
 constexpr double kMargin = 1.001;
 
-std::size_t block_vectors(const TraceOptions& options) {
-  return RS_GAUSSIAN_VECTORS(options.adaptive_radius ? 1 : 0);
-}
-
 bool is_empty(const RsAabb& box) { return box.lo[0] > box.hi[0]; }
 
 // Half-widths of the confidence ellipsoid; false where no ray need meet the Gaussian.
@@ -105,14 +101,18 @@ RayTreeCopy RayTreeCopy::of(const RayTree& tree) {
 }
 
 std::size_t RayTreeCopy::index_at(std::size_t slot) const {
-  const std::size_t lanes = tree.lanes;
-  const std::size_t vector = RS_GAUSSIAN_INDEX(options.adaptive_radius ? 1 : 0);
-  return (slot / lanes * block_vectors(options) + vector) * lanes + slot % lanes;
+  return at(slot, RS_GAUSSIAN_INDEX(options.adaptive_radius || tree.trail ? 1 : 0));
 }
 
 std::size_t RayTreeCopy::mean_at(std::size_t slot, std::size_t axis) const {
+  return at(slot, RS_GAUSSIAN_MEAN + axis);
+}
+
+std::size_t RayTreeCopy::at(std::size_t slot, std::size_t k) const {
   const std::size_t lanes = tree.lanes;
-  return (slot / lanes * block_vectors(options) + RS_GAUSSIAN_MEAN + axis) * lanes + slot % lanes;
+  const std::size_t vectors = RayTree::block_floats(options, {static_cast<int>(lanes), tree.trail});
+  // RS_LANE_FLOAT of cl/bvh/lbvh_node.h.
+  return tree.trail ? slot * vectors + k : (slot / lanes * vectors + k) * lanes + slot % lanes;
 }
 
 std::string validate_ray_tree(const RayTreeCopy& tree, const Gaussians& model, LeafOrder order) {

@@ -22,6 +22,9 @@ struct RayTreeCopy {
   /// Place in `blocks` of the index (as bits) and of coordinate `axis` of the mean in a slot.
   std::size_t index_at(std::size_t slot) const;
   std::size_t mean_at(std::size_t slot, std::size_t axis) const;
+
+ private:
+  std::size_t at(std::size_t slot, std::size_t k) const;
 };
 
 /// Checks the tree of the last build() or refit() against the model that it was made of: every

@@ -51,15 +51,15 @@ struct RayShare {
 RayShare rays_per_gaussian(const TrainOptions& options,
                            std::size_t gaussians,
                            const DeviceInfo& device) {
-  const int lanes = ray_lanes(device, 0);
+  const TreeForm form = tree_form(device);
   const GradientSumChoice choice =
       RayBackward::sum_choice(options.trace, device, gaussians, options.sh_degree);
   const std::size_t lines =
       RayBackward::sum_lines(options.sh_degree) * sizeof(GradientSums::Line) * choice.copies;
   const std::size_t exact = choice.sum == GradientSum::kExact ? lines * RS_EXACT_WORDS : 0;
-  const std::size_t block = sizeof(float) * RayTree::block_floats(options.trace.adaptive_radius);
+  const std::size_t block = sizeof(float) * RayTree::block_floats(options.trace, form);
   // Box, tree, record.
-  return {sizeof(RsAabb) + Lbvh::bytes_per_box(lanes) + block + 64 + lines + exact,
+  return {sizeof(RsAabb) + Lbvh::bytes_per_box(form) + block + 64 + lines + exact,
           std::max({lines, exact, block})};
 }
 
@@ -150,7 +150,7 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
   if (demand.ray_views > 0) {
     const RayShare share = rays_per_gaussian(options, demand.gaussians, device);
     out.rays = demand.gaussians * share.bytes + ray_bytes(options, demand.pixels, device) +
-               mesh_bytes(demand.triangles, ray_lanes(device, 0));
+               mesh_bytes(demand.triangles, tree_form(device));
     largest = std::max(largest, share.largest);
   }
   out.largest_buffer =

@@ -22,7 +22,7 @@ ModelValidator::ModelValidator(Context& context, const TraceOptions& options)
     : context_(context),
       chunk_(context.device().type == DeviceType::kCpu ? kCpuChunk : kGpuChunk),
       kernel_(context.kernel("train/model_validator.cl", "find_non_finite")),
-      tree_(context, options, 0),
+      tree_(context, options, tree_form(context.device())),
       found_(context, 2, "validation") {}
 
 std::string ModelValidator::find_non_finite(const Numbers& numbers, const std::string& name) {

@@ -23,8 +23,9 @@ FINALIZE = dict(SIGMOID_SCALE=0, POSE=0, ACCUMULATE=0, RAISE_CLAMPED=1, LENS=0, 
 ATOMIC = dict(PRIVATE_COPIES=0, EXACT_SUMS=0, FLOAT_ATOMICS=1)
 SWAP = dict(ATOMIC, FLOAT_ATOMICS=0)
 EXACT = dict(SWAP, EXACT_SUMS=1)
-# ray_launch.cpp, ray_backward.cpp.
-WALK = dict(LANES=4, TRAIL=1, KEPT=10, GROUP=64, NEAR_LIMIT=0, LENS=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1, SH_DEGREE=3)
+# lbvh.cpp, ray_launch.cpp, ray_backward.cpp.
+TREE = dict(LANES=4, TRAIL=1)
+WALK = dict(TREE, KEPT=10, GROUP=64, NEAR_LIMIT=0, LENS=0, ADAPTIVE_RADIUS=1, PEAK_ORDER=1, SH_DEGREE=3)
 RAY_BACKWARD = dict(WALK, WITH_RAY_GRADIENT=0, RAISE_CLAMPED=1)
 RAY_GRADIENTS = dict(SIGMOID_SCALE=0, LANES=1, GROUP=64)
 # image_loss.cpp: groups, or what devices get whose groups are smaller.
@@ -82,19 +83,19 @@ PROGRAMS = [
     ("rays", "trace/ray_tracer.cl", WALK),
     ("rays entry", "trace/ray_tracer.cl", dict(WALK, PEAK_ORDER=0, ADAPTIVE_RADIUS=0)),
     ("rays leading", "trace/ray_tracer.cl", dict(WALK, LEADING=1)),
-    ("ray order", "trace/ray_launch.cl", dict(LANES=4)),
+    ("ray order", "trace/ray_launch.cl", TREE),
     ("ray backward atomic", "trace/ray_backward.cl", dict(RAY_BACKWARD, **ATOMIC)),
     ("ray backward swap", "trace/ray_backward.cl", dict(RAY_BACKWARD, **SWAP)),
     ("ray backward exact", "trace/ray_backward.cl", dict(RAY_BACKWARD, **EXACT)),
     ("ray backward of rays", "trace/ray_backward.cl", dict(RAY_BACKWARD, **ATOMIC, WITH_RAY_GRADIENT=1)),
     ("ray records", "trace/ray_gradients.cl", RAY_GRADIENTS),
     ("ray gradients", "trace/ray_gradients.cl", dict(RAY_GRADIENTS, SH_DEGREE=3, SH_COEFFICIENTS=16)),
-    ("gaussian blocks", "trace/ray_tree.cl", dict(LANES=4, SIGMOID_SCALE=0, ADAPTIVE_RADIUS=1)),
+    ("gaussian blocks", "trace/ray_tree.cl", dict(TREE, SIGMOID_SCALE=0, ADAPTIVE_RADIUS=1)),
     ("bounds", "bvh/gaussian_bounds.cl", dict(SIGMOID_SCALE=0, ADAPTIVE_RADIUS=1)),
     ("curve", "bvh/curve.cl", dict(CHUNKS, LANES=4)),
-    ("tree", "bvh/lbvh.cl", dict(LANES=4)),
+    ("tree", "bvh/lbvh.cl", TREE),
     ("tree order", "bvh/leaf_order_group.cl", dict(LANES=4, GROUP=64)),
-    ("tree cost", "bvh/tree_cost.cl", dict(CHUNKS, LANES=4)),
+    ("tree cost", "bvh/tree_cost.cl", dict(CHUNKS, **TREE)),
     ("sort arrays", "parallel/radix_sort.cl", dict(CHUNKS, RS_SOURCE_PAIRS=0, RS_TARGET_PAIRS=0)),
     ("sort to pairs", "parallel/radix_sort.cl", dict(CHUNKS, RS_SOURCE_PAIRS=0, RS_TARGET_PAIRS=1)),
     ("sort pairs", "parallel/radix_sort.cl", dict(CHUNKS, RS_SOURCE_PAIRS=1, RS_TARGET_PAIRS=1)),
@@ -122,8 +123,8 @@ PROGRAMS = [
     ("waves", "light/path_tracer.cl", {}),
     ("first hits", "light/first_hits.cl", {}),
     ("mirror paths", "light/mirror_paths.cl", {}),
-    ("surface rays", "light/triangle_tracer.cl", dict(LANES=4, TRAIL=1, GROUP=64)),
-    ("triangle blocks", "light/triangle_blocks.cl", dict(LANES=4)),
+    ("surface rays", "light/triangle_tracer.cl", dict(TREE, GROUP=64)),
+    ("triangle blocks", "light/triangle_blocks.cl", TREE),
     ("ceilings", "bench/ceilings.cl", dict(CHAINS=8)),
 ]
 

@@ -16,6 +16,7 @@
 
 #include "bvh/lbvh_validate.hpp"
 #include "raysplats/error.hpp"
+#include "unit/bvh/tree_forms.hpp"
 #include "unit/failed_allocation.hpp"
 #include "unit/fixture.hpp"
 #include "util/rng.hpp"
@@ -58,8 +59,8 @@ Buffer<RsAabb> uploaded(Context& context, const Boxes& boxes) {
 // A tree whose blocks hold nothing but their boxes.
 class Tree {
  public:
-  Tree(Context& context, int lanes, const ChunkShape& shape)
-      : context_(&context), lbvh_(context, lanes, shape) {}
+  Tree(Context& context, const TreeForm& form, const ChunkShape& shape)
+      : context_(&context), lbvh_(context, form, shape) {}
 
   void build(const Boxes& boxes) {
     lbvh_.order(uploaded(*context_, boxes), boxes.size());
@@ -68,8 +69,7 @@ class Tree {
   void refit(const Boxes& boxes) {
     if (boxes.empty()) return;
     const std::size_t padded = lbvh_.padded_blocks();
-    context_
-        ->kernel("bvh/node_probe.cl", "box_blocks", BuildOptions().define("LANES", lbvh_.lanes()))
+    context_->kernel("bvh/node_probe.cl", "box_blocks", tree_build(lbvh_.form()))
         .launch(Range::linear(padded, 1), static_cast<std::uint32_t>(boxes.size()),
                 static_cast<std::uint32_t>(padded), lbvh_.slots(), uploaded(*context_, boxes),
                 lbvh_.nodes());
@@ -218,13 +218,13 @@ TEST_CASE("lbvh: the curve goes from cell to neighbouring cell through all of th
 
 TEST_CASE("lbvh: every size, width and division of the work") {
   Context context = make_test_context();
-  for (const int lanes : {4, 8, 16}) {
+  for (const TreeForm& form : test::kTreeForms) {
     for (const ChunkShape& shape : kShapes) {
-      if (lanes != 8 && shape.groups != 3) continue;
-      CAPTURE(lanes);
+      if (form.lanes != 8 && shape.groups != 3) continue;
+      CAPTURE(form);
       CAPTURE(shape.groups);
       CAPTURE(shape.group_size);
-      Tree tree(context, lanes, shape);
+      Tree tree(context, form, shape);
       for (const std::size_t count : {0u, 1u, 2u, 17u, 65u, 257u, 5000u})
         check_tree(tree, random_boxes(count, 0.1, count + 1));
       check_tree(tree, random_boxes(30, 0.1, 12));  // smaller after larger
@@ -234,7 +234,7 @@ TEST_CASE("lbvh: every size, width and division of the work") {
 
 TEST_CASE("lbvh: the device's own shape [small] [tiny]") {
   Context context = make_test_context();
-  Tree tree(context, 0, ChunkShape::for_device(context.device()));
+  Tree tree(context, tree_form(test_device()), ChunkShape::for_device(context.device()));
   check_tree(tree, random_boxes(700, 0.1, 3));
   check_tree(tree, clumps(70, 2, 1e5));
 }
@@ -244,7 +244,7 @@ TEST_CASE("lbvh: coincident, aligned and clustered centres") {
   for (const ChunkShape& shape : kShapes) {
     CAPTURE(shape.groups);
     CAPTURE(shape.group_size);
-    Tree tree(context, 8, shape);
+    Tree tree(context, TreeForm{8, false}, shape);
     check_tree(tree, Boxes(777, box_at(1, 2, 3, 0.5, 0.5, 0.5)));
     check_tree(tree, Boxes(40, box_at(0, 0, 0, 0, 0, 0)));
     Boxes line;
@@ -280,7 +280,7 @@ TEST_CASE("lbvh: empty, non-finite, huge and tiny boxes") {
   boxes[8] = {{infinity, infinity, infinity}, {-infinity, -infinity, -infinity}};
   boxes[9] = {{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
   for (const ChunkShape& shape : kShapes) {
-    Tree tree(context, 8, shape);
+    Tree tree(context, TreeForm{8, false}, shape);
     check_tree(tree, boxes);
     const std::vector<std::uint32_t> slots = tree.copy().slots;
     CHECK(std::set<std::uint32_t>(slots.end() - 7, slots.end()) ==
@@ -299,8 +299,8 @@ TEST_CASE("lbvh: empty, non-finite, huge and tiny boxes") {
 
 TEST_CASE("lbvh: a few boxes far away cost rays at most half as many visits again") {
   Context context = make_test_context();
-  for (const int lanes : {4, 16}) {
-    Tree tree(context, lanes, ChunkShape::for_device(context.device()));
+  for (const TreeForm& form : test::kUnlikeTreeForms) {
+    Tree tree(context, form, ChunkShape::for_device(context.device()));
     const std::size_t count = 20000;
     // Boxes that overlap as Gaussians do: a ray meets some twenty of them.
     constexpr double kSize = 6;
@@ -311,7 +311,7 @@ TEST_CASE("lbvh: a few boxes far away cost rays at most half as many visits agai
       const Boxes boxes = clumps(count, 20, distance, kSize);
       check_tree(tree, boxes);
       const Visits visits = visits_of(tree.copy());
-      CAPTURE(lanes);
+      CAPTURE(form);
       CAPTURE(distance);
       CHECK(double(visits.nodes) <= 1.5 * double(alone.nodes));
       CHECK(double(visits.blocks) <= 1.5 * double(alone.blocks));
@@ -328,7 +328,7 @@ TEST_CASE("lbvh: a refit has the boxes of a rebuild and keeps the order") {
   for (const ChunkShape& shape : kShapes) {
     CAPTURE(shape.groups);
     CAPTURE(shape.group_size);
-    Tree tree(context, 8, shape);
+    Tree tree(context, TreeForm{8, false}, shape);
     for (const std::size_t count : {1u, 2u, 1500u}) {
       Boxes boxes = random_boxes(count, 0.1, 31);
       tree.build(boxes);
@@ -350,7 +350,7 @@ TEST_CASE("lbvh: a refit has the boxes of a rebuild and keeps the order") {
 TEST_CASE("lbvh: cost equals the sum over the nodes and tells an outdated order [small]") {
   Context context = make_test_context();
   for (const ChunkShape& shape : {ChunkShape{3, 1, 16}, ChunkShape{2, 16, 16}}) {
-    Tree tree(context, 8, shape);
+    Tree tree(context, TreeForm{8, false}, shape);
     CHECK(tree.cost({}) == 0);
     Boxes boxes = random_boxes(700, 0.1, 41);
     // The window of the grid, to which boxes are clipped, holds them all.
@@ -371,7 +371,7 @@ TEST_CASE("lbvh: cost equals the sum over the nodes and tells an outdated order 
 
 TEST_CASE("lbvh: the cost sees what happens among boxes when others are far away") {
   Context context = make_test_context();
-  Tree tree(context, 8, ChunkShape::for_device(context.device()));
+  Tree tree(context, TreeForm{8, false}, ChunkShape::for_device(context.device()));
   const Boxes boxes = clumps(20000, 20, 1e6);
   tree.build(boxes);
   const double built = tree.cost(boxes);
@@ -391,7 +391,7 @@ TEST_CASE("lbvh: the cost sees what happens among boxes when others are far away
 
 TEST_CASE("lbvh: sizes that do not fit are refused") {
   Context context = make_test_context();
-  Tree tree(context, 4, ChunkShape::for_device(context.device()));
+  Tree tree(context, TreeForm{4, false}, ChunkShape::for_device(context.device()));
   const Boxes boxes = random_boxes(10, 0.1, 1);
   CHECK_THROWS_AS(tree.lbvh().order(uploaded(context, boxes), 11), UsageError);
   tree.build(boxes);
@@ -400,7 +400,7 @@ TEST_CASE("lbvh: sizes that do not fit are refused") {
 
 TEST_CASE("lbvh validation: a fault of each kind is found") {
   Context context = make_test_context();
-  Tree tree(context, 4, ChunkShape::for_device(context.device()));
+  Tree tree(context, TreeForm{4, false}, ChunkShape::for_device(context.device()));
   Boxes boxes = random_boxes(1000, 0.1, 1);
   tree.build(boxes);
   const LbvhCopy sound = tree.copy();
@@ -426,7 +426,7 @@ TEST_CASE("lbvh validation: a fault of each kind is found") {
     CHECK(validate_lbvh(sound, boxes, LeafOrder::kAny).find("of level 1") != std::string::npos);
   }
   SUBCASE("a node that leaves out a child, and one that is too large") {
-    const std::size_t at = sound.level_begin[2] * 6 * sound.lanes;
+    const std::size_t at = sound.at(sound.level_begin[2], 0, 0);
     faulty.nodes[at] = std::nextafter(faulty.nodes[at], 10.0f);
     CHECK(has("Child 0 of level 2"));
     faulty.nodes[at] = sound.nodes[at] - 1;
@@ -435,7 +435,7 @@ TEST_CASE("lbvh validation: a fault of each kind is found") {
   SUBCASE("a missing child that is not empty") {
     const std::size_t last = sound.level_sizes[0] - 1;
     REQUIRE(250 % sound.lanes != 0);  // blocks
-    faulty.nodes[last * 6 * sound.lanes + 3] = 0;
+    faulty.nodes[sound.at(last, 0, 3)] = 0;
     CHECK(has("the empty one of a missing child"));
   }
   SUBCASE("a level that begins elsewhere") {
@@ -443,7 +443,7 @@ TEST_CASE("lbvh validation: a fault of each kind is found") {
     CHECK(has("Level 2"));
   }
   SUBCASE("the scene's box") {
-    faulty.nodes[static_cast<std::size_t>(tree.lbvh().scene_node()) * 6 * sound.lanes] -= 1;
+    faulty.nodes[sound.at(tree.lbvh().scene_node(), 0, 0)] -= 1;
     CHECK(has("the scene"));
   }
   SUBCASE("another number of boxes") {
@@ -490,7 +490,7 @@ TEST_CASE("lbvh: where an allocation fails the tree is empty, and may be made la
   bool failed = true;
   for (std::size_t n = 1; failed; ++n) {
     CAPTURE(n);
-    Tree tree(context, 4, ChunkShape::for_device(context.device()));
+    Tree tree(context, TreeForm{4, false}, ChunkShape::for_device(context.device()));
     tree.build(few);
     failed = fails_at(context, n, [&] { tree.lbvh().order(device_boxes, many.size()); });
     if (failed) {

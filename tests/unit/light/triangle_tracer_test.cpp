@@ -14,6 +14,7 @@
 #include "raysplats/error.hpp"
 #include "reference/light_scenes.hpp"
 #include "reference/triangles.hpp"
+#include "unit/bvh/tree_forms.hpp"
 #include "unit/trace/trace_fixture.hpp"
 #include "util/rng.hpp"
 
@@ -138,8 +139,8 @@ Agreement compare_all(const std::vector<Triangle>& triangles,
 void check_against_brute_force(Context& context,
                                const std::vector<Mesh>& meshes,
                                const std::vector<Ray>& rays,
-                               int lanes = 0) {
-  TriangleTracer tracer(context, lanes);
+                               const TreeForm& form = tree_form(test_device())) {
+  TriangleTracer tracer(context, form);
   tracer.build(meshes);
   const std::vector<Triangle> triangles = reference::triangles_of(meshes);
   REQUIRE(tracer.size() == triangles.size());
@@ -162,20 +163,20 @@ TEST_CASE("a million rays meet the triangles that brute force finds") {
 
 TEST_CASE("every width of the tree finds the same [small]") {
   Context context = make_test_context();
-  for (const int lanes : {4, 8, 16}) {
-    CAPTURE(lanes);
+  for (const TreeForm& form : test::kTreeForms) {
+    CAPTURE(form);
     check_against_brute_force(context,
                               {triangle_soup(700, 2, 0.08), triangle_soup(333, 3, 0.05),
                                reference::ball({0.2, 0.1, 0}, 0.7, 9, 0, false)},
-                              axis_rays(4000, 2), lanes);
+                              axis_rays(4000, 2), form);
   }
 }
 
 TEST_CASE("a few triangles are met in trees of every width [tiny]") {
   Context context = make_test_context();
-  for (const int lanes : {4, 8, 16}) {
-    CAPTURE(lanes);
-    check_against_brute_force(context, {triangle_soup(70, 4, 0.5)}, axis_rays(60, 3), lanes);
+  for (const TreeForm& form : test::kTreeForms) {
+    CAPTURE(form);
+    check_against_brute_force(context, {triangle_soup(70, 4, 0.5)}, axis_rays(60, 3), form);
   }
 }
 
@@ -226,9 +227,9 @@ TEST_CASE("no ray leaves a closed mesh, through its edges and corners neither") 
         }
       }
     }
-    for (const int lanes : {4, 8, 16}) {
-      CAPTURE(lanes);
-      TriangleTracer tracer(context, lanes);
+    for (const TreeForm& form : test::kTreeForms) {
+      CAPTURE(form);
+      TriangleTracer tracer(context, form);
       tracer.build(std::vector<Mesh>{body.mesh});
       const std::vector<RsSurfaceHit> hits = trace(context, tracer, rays);
       std::size_t escaped = 0;
@@ -298,9 +299,9 @@ TEST_CASE("light crosses a surface once where its triangles share an edge or a c
         rays.push_back(make_ray(glm::dvec3(x / 8.0, y / 8.0, 0) - 4.0 * along, along));
     }
   }
-  for (const int lanes : {4, 8, 16}) {
-    CAPTURE(lanes);
-    TriangleTracer tracer(context, lanes);
+  for (const TreeForm& form : test::kTreeForms) {
+    CAPTURE(form);
+    TriangleTracer tracer(context, form);
     tracer.build(std::vector<Mesh>{fan});
     Buffer<Ray> device_rays(context, rays.size(), "rays");
     device_rays.upload(rays);
@@ -337,9 +338,9 @@ TEST_CASE("light that passes is the product over the crossed triangles [small]")
     skipped.push_back(i % 2 == 0 ? -1 : static_cast<std::int32_t>(rng.below(triangles.size())));
     if (i % 97 == 0) rays[i].t_max = -1.0f;
   }
-  for (const int lanes : {4, 8, 16}) {
-    CAPTURE(lanes);
-    TriangleTracer tracer(context, lanes);
+  for (const TreeForm& form : test::kTreeForms) {
+    CAPTURE(form);
+    TriangleTracer tracer(context, form);
     tracer.build(meshes);
     Buffer<Ray> device_rays(context, rays.size(), "rays");
     device_rays.upload(rays);
@@ -493,8 +494,8 @@ TEST_CASE("both sides of a single triangle are met, its interval is kept [small]
   mesh.positions = {-1, -1, 2, 3, -1, 2, -1, 3, 2};
   mesh.triangles = {0, 1, 2};
   mesh.materials = {0};
-  for (const int lanes : {4, 8, 16}) {
-    TriangleTracer tracer(context, lanes);
+  for (const TreeForm& form : test::kTreeForms) {
+    TriangleTracer tracer(context, form);
     tracer.build(std::vector<Mesh>{mesh});
     const std::vector<Ray> rays = {
         make_ray({0, 0.5, 0}, {0, 0, 1}),
@@ -532,8 +533,8 @@ TEST_CASE("of coincident triangles the one with the lowest number is met") {
     }
     mesh.materials.push_back(0);
   }
-  for (const int lanes : {4, 8, 16}) {
-    TriangleTracer tracer(context, lanes);
+  for (const TreeForm& form : test::kTreeForms) {
+    TriangleTracer tracer(context, form);
     tracer.build(std::vector<Mesh>{mesh});
     CHECK(trace(context, tracer, {make_ray({0.1, 0.2, 0}, {0, 0, 1})})[0].triangle == 7);
   }

@@ -7,6 +7,7 @@
 #include <glm/matrix.hpp>
 
 #include "raysplats/error.hpp"
+#include "unit/bvh/tree_forms.hpp"
 #include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
@@ -55,8 +56,8 @@ HostGradients gradients_on_device(Context& context,
                                   const std::vector<Ray>& rays,
                                   const Gradients& gradients,
                                   ColorDirection direction,
-                                  int lanes = 0) {
-  RayTracer tracer(context, options, lanes);
+                                  const TreeForm& form = tree_form(test_device())) {
+  RayTracer tracer(context, options, form);
   tracer.update(gaussians);
   Batch batch(context, rays, gradients);
   tracer.trace(gaussians, batch.rays, rays.size(), batch.results, direction);
@@ -93,7 +94,7 @@ GradientErrors compare_gradients(Context& context,
                                  const std::vector<Ray>& rays,
                                  ColorDirection direction,
                                  ScaleActivation activation = ScaleActivation::kExp,
-                                 int lanes = 0) {
+                                 const TreeForm& form = tree_form(test_device())) {
   const reference::Parameters parameters(model, activation);
   const Gradients gradients = gradients_without_ties(parameters, options, rays, direction);
   std::vector<reference::RayQuery> queries;
@@ -106,8 +107,7 @@ GradientErrors compare_gradients(Context& context,
       reference::ray_gradient(parameters, options, queries, wide, mode_of(direction));
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, activation);
   return errors_of(
-      gradients_on_device(context, gaussians, options, rays, gradients, direction, lanes),
-      expected);
+      gradients_on_device(context, gaussians, options, rays, gradients, direction, form), expected);
 }
 
 void check_every_variant(Gaussians model, const std::vector<Ray>& rays) {
@@ -175,11 +175,11 @@ TEST_CASE("gradients of arbitrary rays for every SH degree and vector width") {
                    1e-3);
     }
   }
-  for (const int lanes : {4, 8, 16}) {
-    CAPTURE(lanes);
+  for (const TreeForm& form : test::kTreeForms) {
+    CAPTURE(form);
     CHECK_ERRORS(
         compare_gradients(context, reference::random_scene(203, 73, 1), {}, random_rays(300, 23),
-                          ColorDirection::kRay, ScaleActivation::kExp, lanes),
+                          ColorDirection::kRay, ScaleActivation::kExp, form),
         1e-3);
   }
 }

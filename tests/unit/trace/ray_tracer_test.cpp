@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "unit/bvh/tree_forms.hpp"
 #include "unit/trace/trace_fixture.hpp"
 
 using namespace raysplats;
@@ -69,9 +70,9 @@ void check_rays(Context& context,
                 const TraceOptions& options,
                 const std::vector<Ray>& rays,
                 ColorDirection direction,
-                int lanes = 0) {
+                const TreeForm& form = tree_form(test_device())) {
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-  RayTracer tracer(context, options, lanes);
+  RayTracer tracer(context, options, form);
   tracer.update(gaussians);
   check_results(model, options, rays, direction, tracer.trace(gaussians, rays, direction));
 }
@@ -176,9 +177,9 @@ TEST_CASE("hits a million units away are met in the order that a naive root lose
     REQUIRE(expected.hits[k].t > expected.hits[k - 1].t + 1.0);  // no near-ties
   }
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
-  for (const int lanes : {4, 8, 16}) {
-    CAPTURE(lanes);
-    RayTracer tracer(context, options, lanes);
+  for (const TreeForm& form : test::kTreeForms) {
+    CAPTURE(form);
+    RayTracer tracer(context, options, form);
     tracer.update(gaussians);
     const std::vector<Ray> ray{make_ray({0, 0, 0}, {0, 0, 1})};
     const RayResult result = tracer.trace(gaussians, ray, ColorDirection::kFromOrigin)[0];
@@ -236,32 +237,33 @@ TEST_CASE("every vector width traces the same") {
   const Gaussians model = reference::random_scene(700, 51, 1);
   const std::vector<Ray> rays = axis_rays(120, 11);
   for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
-    for (const int lanes : {4, 8, 16}) {
+    for (const TreeForm& form : test::kTreeForms) {
       CAPTURE(static_cast<int>(order));
-      CAPTURE(lanes);
+      CAPTURE(form);
       TraceOptions options;
       options.hit_order = order;
       options.background = {0.3f, 0.1f, 0.2f};
-      check_rays(context, model, options, rays, ColorDirection::kRay, lanes);
+      check_rays(context, model, options, rays, ColorDirection::kRay, form);
       options.adaptive_radius = true;
-      check_rays(context, model, options, rays, ColorDirection::kFromOrigin, lanes);
+      check_rays(context, model, options, rays, ColorDirection::kFromOrigin, form);
     }
   }
   for (const int lanes : {1, 2, 3, 32, -4}) {
-    CHECK_THROWS_AS(RayTracer(context, TraceOptions{}, lanes), UsageError);
+    CHECK_THROWS_AS(RayTracer(context, TraceOptions{}, TreeForm{lanes, false}), UsageError);
   }
+  CHECK_THROWS_AS(RayTracer(context, TraceOptions{}, TreeForm{8, true}), UsageError);
 }
 
 TEST_CASE("counts around full blocks and full nodes") {
   Context context = make_test_context();
-  for (const int lanes : {4, 8, 16}) {
+  for (const TreeForm& form : test::kTreeForms) {
     for (const std::size_t count : {1, 2, 3, 4, 5, 15, 16, 17, 31, 63, 65, 255, 256, 257, 1000}) {
-      CAPTURE(lanes);
+      CAPTURE(form);
       CAPTURE(count);
       Gaussians model = reference::random_scene(count, 60 + count, 0);
       // Small counts get large Gaussians, which few rays would find.
       for (float& scale : model.log_scales) scale = std::min(scale, std::log(0.4f));
-      check_rays(context, model, TraceOptions{}, axis_rays(40, count), ColorDirection::kRay, lanes);
+      check_rays(context, model, TraceOptions{}, axis_rays(40, count), ColorDirection::kRay, form);
     }
   }
 }
@@ -312,14 +314,14 @@ TEST_CASE("rays with many times more hits than there is room for") {
   for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
     options.hit_order = order;
     const std::vector<Ray>& all = order == HitOrder::kPeak ? rays : outside;
-    for (const int lanes : {4, 16}) {
-      RayTracer tracer(context, options, lanes);
+    for (const TreeForm& form : test::kUnlikeTreeForms) {
+      RayTracer tracer(context, options, form);
       tracer.update(gaussians);
       const std::vector<RayResult> results = tracer.trace(gaussians, all);
       std::size_t crowded = 0;
       for (std::size_t i = 0; i < all.size(); ++i) {
         CAPTURE(i);
-        CAPTURE(lanes);
+        CAPTURE(form);
         const Ray& r = all[i];
         const reference::RayTrace expected =
             reference::trace_ray(parameters, options, {r.origin[0], r.origin[1], r.origin[2]},
@@ -358,9 +360,9 @@ TEST_CASE("equal depths are blended by index, also across the room for hits") {
                               make_ray({2, 2, 2}, {-1, -0.9, -0.8})};
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
   const reference::Parameters parameters(model);
-  for (const int lanes : {4, 8, 16}) {
-    CAPTURE(lanes);
-    RayTracer tracer(context, options, lanes);
+  for (const TreeForm& form : test::kTreeForms) {
+    CAPTURE(form);
+    RayTracer tracer(context, options, form);
     tracer.update(gaussians);
     const std::vector<RayResult> results = tracer.trace(gaussians, rays);
     for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -405,8 +407,8 @@ TEST_CASE("Gaussians with NaN or infinity are never met") {
     }
   }
   const std::vector<Ray> rays = axis_rays(100, 15);
-  for (const int lanes : {4, 8, 16}) {
-    RayTracer tracer(context, TraceOptions{}, lanes);
+  for (const TreeForm& form : test::kTreeForms) {
+    RayTracer tracer(context, TraceOptions{}, form);
     const DeviceGaussians gaussians =
         DeviceGaussians::upload(context, mixed, ScaleActivation::kExp);
     tracer.update(gaussians);
@@ -419,8 +421,8 @@ TEST_CASE("a refitted tree gives what a built one gives") {
   Gaussians model = reference::random_scene(900, 57, 0);
   DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
   const std::vector<Ray> rays = axis_rays(150, 16);
-  for (const int lanes : {4, 16}) {
-    RayTracer tracer(context, TraceOptions{}, lanes);
+  for (const TreeForm& form : test::kUnlikeTreeForms) {
+    RayTracer tracer(context, TraceOptions{}, form);
     tracer.update(gaussians);
     Gaussians moved = model;
     CounterRng rng(58, 2);

@@ -10,6 +10,7 @@
 #include "raysplats/error.hpp"
 #include "reference/scenes.hpp"
 #include "trace/ray_tree_validate.hpp"
+#include "unit/bvh/tree_forms.hpp"
 #include "unit/failed_allocation.hpp"
 #include "unit/fixture.hpp"
 #include "util/rng.hpp"
@@ -36,11 +37,11 @@ struct Fixture {
 
 TEST_CASE("ray tree: a sound tree has no fault, built or refitted") {
   for (const bool adaptive : {false, true}) {
-    for (const int lanes : {4, 8, 16}) {
+    for (const TreeForm& form : test::kTreeForms) {
       Fixture f;
       f.options.adaptive_radius = adaptive;
       f.model.opacities[7] = -9;  // below 1/255
-      RayTree tree(f.context, f.options, lanes);
+      RayTree tree(f.context, f.options, form);
       tree.build(f.uploaded());
       CHECK(validate_ray_tree(RayTreeCopy::of(tree), f.model) == "");
       f.shake(0.05);
@@ -56,7 +57,7 @@ TEST_CASE("ray tree: a sound tree has no fault, built or refitted") {
 TEST_CASE("ray tree: an empty model [small] [tiny]") {
   Fixture f;
   f.model.resize(0);
-  RayTree tree(f.context, f.options, 0);
+  RayTree tree(f.context, f.options, tree_form(test_device()));
   tree.build(f.uploaded());
   CHECK(validate_ray_tree(RayTreeCopy::of(tree), f.model) == "");
   CHECK(tree.follow(f.uploaded()));
@@ -64,7 +65,7 @@ TEST_CASE("ray tree: an empty model [small] [tiny]") {
 
 TEST_CASE("ray tree: it is built anew when walking it has become dearer, and refitted otherwise") {
   Fixture f;
-  RayTree tree(f.context, f.options, 0);
+  RayTree tree(f.context, f.options, tree_form(test_device()));
   CHECK(tree.follow(f.uploaded()));
   for (int i = 0; i < 40; ++i) {
     f.shake(1e-4);
@@ -85,7 +86,7 @@ TEST_CASE("ray tree: it is built anew when walking it has become dearer, and ref
 
 TEST_CASE("ray tree: it is built anew for Gaussians that left the place where it was built") {
   Fixture f;
-  RayTree tree(f.context, f.options, 0);
+  RayTree tree(f.context, f.options, tree_form(test_device()));
   tree.build(f.uploaded());
   f.model = reference::random_scene(700, 5, 1);
   for (float& mean : f.model.means) mean += 50.0f;
@@ -102,7 +103,7 @@ TEST_CASE("ray tree: after a build that failed it is not refitted but built") {
   bool failed = true;
   for (std::size_t n = 1; failed; ++n) {
     CAPTURE(n);
-    RayTree tree(f.context, f.options, 0);
+    RayTree tree(f.context, f.options, tree_form(test_device()));
     CHECK_THROWS_AS(tree.refit(former), UsageError);
     tree.build(former);
     failed = fails_at(f.context, n, [&] { tree.build(next); });
@@ -116,7 +117,7 @@ TEST_CASE("ray tree: after a build that failed it is not refitted but built") {
 
 TEST_CASE("ray tree validation: a fault of each kind is found") {
   Fixture f;
-  RayTree tree(f.context, f.options, 8);
+  RayTree tree(f.context, f.options, {8, false});
   tree.build(f.uploaded());
   RayTreeCopy copy = RayTreeCopy::of(tree);
   REQUIRE(validate_ray_tree(copy, f.model) == "");
