@@ -139,7 +139,8 @@ std::vector<std::uint32_t> DensityPlan::state_source() const {
 std::string DensityPlan::remedy() const {
   const std::array<std::pair<std::size_t, const char*>, 6> reasons{
       {{outside, "most are outside of --bounds: give a larger box"},
-       {faint, "most are too faint: lower --prune-opacity or --opacity-lr"},
+       {faint,
+        "most are too faint: lower --prune-opacity or --opacity-lr, or raise --init-opacity"},
        {large, "most are too large: raise --prune-scale, or set it to 0"},
        {small, "most are too small: lower --prune-scale-min"},
        {unseen, "no view meets most of them: see whether cameras and points belong together"},
