@@ -38,6 +38,16 @@ constexpr double kSeenThere = 0.5;
 constexpr std::size_t kDepths = 200;
 constexpr double kRim = 2;  // pixels around a mark, whose edges are the clearest of it alone
 constexpr int kSteps = 8;   // places along a side
+// A ground that stands still.
+constexpr std::size_t kAlikePhotos = 5;
+constexpr double kAlike = 0.3;      // of a photo's edges, that another has at the same pixels
+constexpr float kOtherStep = 0.6f;  // of an edge's step, by which the other's may differ
+constexpr double kGround = 0.15;    // of a photo's edges, that all alike photos have
+// Outlines of what is round stand still as well, but on lines: so of cells of so many to the longer
+// side a share has still edges.
+constexpr int kCells = 40;
+constexpr double kGroundCells = 0.12;
+constexpr std::size_t kPlaces = 300;  // pixels that are asked for a place where rays meet
 constexpr double kNearest = 0.01, kFarthest = 1e4;
 
 struct Edge {
@@ -172,6 +182,97 @@ bool may_be_seen(std::span<const SmallPhoto> photos, const glm::dvec2& place, do
   return false;
 }
 
+// The steps of a photo's brightness, as its second channel shows it; zero where there is no edge.
+std::vector<glm::vec2> edges_of(const SmallPhoto& photo) {
+  const io::Photo& picture = *photo.picture;
+  std::vector<glm::vec2> out(picture.pixels(), glm::vec2(0.0f));
+  for (int y = 1; y < picture.height - 1; ++y) {
+    for (int x = 1; x < picture.width - 1; ++x) {
+      const glm::vec2 step = step_at(picture, x, y, 1);
+      if (glm::length(step) >= kLeastStep)
+        out[static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.width) +
+            static_cast<std::size_t>(x)] = step;
+    }
+  }
+  return out;
+}
+
+bool is_edge(const glm::vec2& step) { return step.x != 0.0f || step.y != 0.0f; }
+
+bool has_edge(const glm::vec2& own, const glm::vec2& other) {
+  return glm::distance(own, other) <= kOtherStep * glm::length(own);
+}
+
+// The share of a photo's edges that another one has at the same pixels.
+double shared_edges(std::span<const glm::vec2> own, std::span<const glm::vec2> other) {
+  std::size_t all = 0, same = 0;
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    if (!is_edge(own[i])) continue;
+    ++all;
+    same += has_edge(own[i], other[i]) ? 1 : 0;
+  }
+  return all == 0 ? 0.0 : static_cast<double>(same) / static_cast<double>(all);
+}
+
+// The share of a photo's cells that have one of these pixels.
+double cells_with(std::span<const std::size_t> pixels, int width, int height) {
+  const int side = std::max(1, std::max(width, height) / kCells);
+  const int across = (width + side - 1) / side, down = (height + side - 1) / side;
+  std::vector<char> has(static_cast<std::size_t>(across) * static_cast<std::size_t>(down), 0);
+  for (const std::size_t pixel : pixels) {
+    const auto x = static_cast<int>(pixel % static_cast<std::size_t>(width));
+    const auto y = static_cast<int>(pixel / static_cast<std::size_t>(width));
+    has[static_cast<std::size_t>(y / side) * static_cast<std::size_t>(across) +
+        static_cast<std::size_t>(x / side)] = 1;
+  }
+  return static_cast<double>(std::count(has.begin(), has.end(), 1)) /
+         static_cast<double>(has.size());
+}
+
+// The photo with the most others like it, and these.
+std::vector<std::size_t> alike_photos(std::span<const std::vector<glm::vec2>> edges) {
+  std::vector<std::vector<std::size_t>> groups(edges.size());
+  in_parallel(edges.size(), [&](std::size_t i) {
+    for (std::size_t j = 0; j < edges.size(); ++j) {
+      if (j == i || shared_edges(edges[i], edges[j]) >= kAlike) groups[i].push_back(j);
+    }
+  });
+  if (groups.empty()) return {};
+  return *std::max_element(groups.begin(), groups.end(),
+                           [](const auto& a, const auto& b) { return a.size() < b.size(); });
+}
+
+// Pixels of edges that (nearly) all of these photos have as the first of them has.
+std::vector<std::size_t> still_edges(std::span<const std::vector<glm::vec2>> edges,
+                                     std::span<const std::size_t> alike) {
+  const std::vector<glm::vec2>& first = edges[alike.front()];
+  std::vector<std::size_t> out;
+  for (std::size_t pixel = 0; pixel < first.size(); ++pixel) {
+    if (!is_edge(first[pixel])) continue;
+    std::size_t odd = 0;
+    for (const std::size_t i : alike) odd += has_edge(first[pixel], edges[i][pixel]) ? 0 : 1;
+    if (odd * kOddOneIn <= alike.size()) out.push_back(pixel);
+  }
+  return out;
+}
+
+// The share of some of these pixels at which no thing of the scene may be seen in most photos.
+double share_apart(std::span<const SmallPhoto> photos, std::span<const std::size_t> pixels) {
+  std::vector<Camera> cameras;
+  cameras.reserve(photos.size());
+  for (const SmallPhoto& photo : photos) cameras.push_back(photo.camera);
+  const double extent = camera_extent(cameras);
+  const auto width = static_cast<std::size_t>(photos.front().picture->width);
+  std::vector<char> apart(std::min(kPlaces, pixels.size()), 0);
+  in_parallel(apart.size(), [&](std::size_t i) {
+    const std::size_t pixel = pixels[i * pixels.size() / apart.size()];
+    const auto x = static_cast<double>(pixel % width), y = static_cast<double>(pixel / width);
+    apart[i] = may_be_seen(photos, {x + 0.5, y + 0.5}, extent) ? 0 : 1;
+  });
+  return static_cast<double>(std::count(apart.begin(), apart.end(), 1)) /
+         static_cast<double>(apart.size());
+}
+
 // The photos of the size that most have.
 std::vector<SmallPhoto> of_one_size(std::span<const SmallPhoto> photos) {
   std::map<std::pair<int, int>, std::vector<SmallPhoto>> sizes;
@@ -249,6 +350,26 @@ std::vector<StillMark> still_marks(std::span<const SmallPhoto> all) {
   std::sort(out.begin(), out.end(),
             [](const StillMark& a, const StillMark& b) { return a.edges > b.edges; });
   return out;
+}
+
+std::optional<StillGround> still_ground(std::span<const SmallPhoto> all) {
+  const std::vector<SmallPhoto> photos = of_one_size(all);
+  std::vector<std::vector<glm::vec2>> edges(photos.size());
+  in_parallel(photos.size(), [&](std::size_t i) { edges[i] = edges_of(photos[i]); });
+  const std::vector<std::size_t> alike = alike_photos(edges);
+  if (alike.size() < kAlikePhotos) return std::nullopt;
+  const std::vector<std::size_t> still = still_edges(edges, alike);
+  if (still.empty()) return std::nullopt;
+  std::vector<SmallPhoto> group;
+  for (const std::size_t i : alike) group.push_back(photos[i]);
+  const std::vector<glm::vec2>& first = edges[alike.front()];
+  const double share = static_cast<double>(still.size()) /
+                       static_cast<double>(std::count_if(first.begin(), first.end(), is_edge));
+  const double apart = share * share_apart(group, still);
+  const io::Photo& picture = *group.front().picture;
+  if (apart < kGround || cells_with(still, picture.width, picture.height) < kGroundCells)
+    return std::nullopt;
+  return StillGround{group.size(), apart};
 }
 
 }  // namespace raysplats

@@ -130,6 +130,38 @@ TEST_CASE("a run is warned of masks that keep what they should leave out, and na
   }
 }
 
+TEST_CASE("a run is warned of a ground that does not turn with a turntable, but not beside masks") {
+  Capture capture(ring(16, 3.0, {0, 0, 0}));
+  capture.hold_out(0);
+  const TrainOptions options = short_training(16);
+  CHECK_FALSE(capture.says("turntable", options));
+  const auto is_body = [](int x, int y) { return x > 30 && x < 50 && y > 20; };
+  for (std::size_t i = 0; i < capture.dataset.views.size(); ++i) {
+    View& view = capture.dataset.views[i];
+    Image photo = read_image(view.image_path);
+    for (int y = 0; y < photo.height; ++y) {
+      for (int x = 0; x < photo.width; ++x) {
+        for (int c = 0; c < 3 && !is_body(x, y); ++c)
+          photo.at(x, y, c) = (x / 4 + y / 5) % 2 == 0 ? 0.8f : 0.2f;
+      }
+    }
+    write_image(view.image_path, photo);
+  }
+  CHECK(capture.says("at the same pixels of 16 of 16 of them", options));
+  CHECK(capture.says("leave it out by masks", options));
+  for (std::size_t i = 0; i < capture.dataset.views.size(); ++i) {
+    View& view = capture.dataset.views[i];
+    const Image photo = read_image(view.image_path);
+    Image mask(photo.width, photo.height, 1, 0.0f);
+    for (int y = 0; y < photo.height; ++y) {
+      for (int x = 0; x < photo.width; ++x) mask.at(x, y, 0) = is_body(x, y) ? 1.0f : 0.0f;
+    }
+    view.mask_path = capture.folder / ("body_" + std::to_string(i) + ".png");
+    write_image(view.mask_path, mask);
+  }
+  CHECK_FALSE(capture.says("does not turn", options));
+}
+
 TEST_CASE("a run is warned of what stands at the same pixels of all photos, and says where") {
   Capture capture(ring(16, 3.0, {0, 0, 0}));
   capture.hold_out(0);

@@ -38,17 +38,17 @@ glm::dvec4 dated(const CameraRay& ray, int x, int y) {
   return is_letter(x, y) ? glm::dvec4(1, 1, 1, 1) : pattern(ray, x, y);
 }
 
-std::vector<Camera> around(int count) {
+std::vector<Camera> around(int count, double height = 1.2) {
   std::vector<Camera> cameras;
   for (int i = 0; i < count; ++i) {
     const double angle = 6.283 * i / count;
-    cameras.push_back(look_at({3 * std::cos(angle), 3 * std::sin(angle), 1.2}, {0, 0, 0}, {0, 0, 1},
-                              kWidth, kHeight, 400));
+    cameras.push_back(look_at({3 * std::cos(angle), 3 * std::sin(angle), height}, {0, 0, 0},
+                              {0, 0, 1}, kWidth, kHeight, 400));
   }
   return cameras;
 }
 
-std::vector<StillMark> found(const std::vector<Camera>& cameras, const Shows& shows) {
+std::vector<SmallPhoto> photos_by(const std::vector<Camera>& cameras, const Shows& shows) {
   std::vector<SmallPhoto> photos;
   for (const Camera& camera : cameras) {
     int pixel = 0;
@@ -58,7 +58,19 @@ std::vector<StillMark> found(const std::vector<Camera>& cameras, const Shows& sh
       return shows(ray, x, y);
     }));
   }
-  return still_marks(photos);
+  return photos;
+}
+
+std::vector<StillMark> found(const std::vector<Camera>& cameras, const Shows& shows) {
+  return still_marks(photos_by(cameras, shows));
+}
+
+// A body that turned before a ground, which is another for each height of the camera.
+glm::dvec4 on_turntable(const CameraRay& ray, int x, int y) {
+  const double turned = ray.origin.z > 2 ? 0.7 : 0.0;
+  const double wave = 0.5 + 0.4 * std::sin(0.3 * x + turned * y) * std::sin(0.3 * y + 3 * turned);
+  const bool body = x > 130 && x < 270 && y > 60;
+  return body ? pattern(ray, x, y) : glm::dvec4(wave, wave, wave, 1);
 }
 
 }  // namespace
@@ -117,6 +129,34 @@ TEST_CASE("a ground that stays where it is behind a turntable is no small mark")
   CHECK(found(around(16), [](const CameraRay& ray, int x, int y) {
           return y < 120 ? glm::dvec4(1, 1, 1, 1) : pattern(ray, x, y);
         }).empty());
+}
+
+TEST_CASE("a ground that does not turn with a turntable is told, of two heights too") {
+  const auto ground = still_ground(photos_by(around(16), on_turntable));
+  REQUIRE(ground.has_value());
+  CHECK(ground->photos == 16);
+  CHECK(ground->edges > 0.3);
+  std::vector<Camera> two = around(8);
+  for (const Camera& camera : around(8, 3.0)) two.push_back(camera);
+  const auto half = still_ground(photos_by(two, on_turntable));
+  REQUIRE(half.has_value());
+  CHECK(half->photos == 8);
+}
+
+TEST_CASE("no ground stands still around a camera that moves, beside masks, or that is plain") {
+  CHECK_FALSE(still_ground(photos_by(around(16), pattern)).has_value());
+  CHECK_FALSE(still_ground(photos_by(around(16), dated)).has_value());
+  CHECK_FALSE(still_ground(photos_by(around(16), [](const CameraRay& ray, int x, int y) {
+                const bool body = x > 130 && x < 270 && y > 60;
+                return glm::dvec4(glm::dvec3(on_turntable(ray, x, y)), body ? 1 : 0);
+              })).has_value());
+  CHECK_FALSE(still_ground(photos_by(around(16), [](const CameraRay& ray, int x, int y) {
+                const bool body = x > 130 && x < 270 && y > 60;
+                return body ? pattern(ray, x, y) : glm::dvec4(0.8, 0.8, 0.8, 1);
+              })).has_value());
+  // Cameras that do not move see everything at the same pixels.
+  CHECK_FALSE(
+      still_ground(photos_by(std::vector<Camera>(16, around(1).front()), pattern)).has_value());
 }
 
 TEST_CASE("the area of a mark is that of the photo, whose lens may bend it") {
