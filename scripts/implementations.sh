@@ -96,7 +96,7 @@ prepare() {
       root=$(fetched rusticl) || return 77
       # It reads /usr/lib/clc and wants a newer C library: a view of /usr of its own, with the packages over it.
       unshare --map-root-user --mount mount -t overlay overlay -o "lowerdir=$root/usr:/usr" /usr 2>"$work/reason" || return 77
-      echo /usr/lib/x86_64-linux-gnu/libRusticlOpenCL.so.1 >"$icd/rusticl.icd"
+      echo "/usr/lib/$(uname -m)-linux-gnu/libRusticlOpenCL.so.1" >"$icd/rusticl.icd"
       prefix=(env RUSTICL_ENABLE=llvmpipe unshare --map-root-user --mount "$work/overlay.sh" "$root/usr")
       printf '#!/bin/sh\nmount -t overlay overlay -o "lowerdir=$1:/usr" /usr && shift && exec "$@"\n' >"$work/overlay.sh"
       chmod +x "$work/overlay.sh"

@@ -7,6 +7,7 @@ runtime under Intel's EULA for developer tools: fetch them, do not pass them on.
 """
 import glob
 import os
+import platform
 import shutil
 import stat
 import subprocess
@@ -14,7 +15,7 @@ import sys
 import tempfile
 import zipfile
 
-LIBRARIES = "usr/lib/x86_64-linux-gnu"
+LIBRARIES = f"usr/lib/{platform.machine()}-linux-gnu"
 KEYS = "/usr/share/keyrings/debian-archive-keyring.gpg"
 
 
