@@ -146,10 +146,9 @@ void warn_of_marks(const Dataset& dataset,
                    std::span<const std::size_t> views) {
   if (const auto ground = still_ground(read)) {
     spdlog::warn(
-        "{:.0f} % of the edges in photos stand at the same pixels of {} of {} of them, though "
-        "their "
-        "cameras are elsewhere by their poses: what is behind a turntable does not turn with it, "
-        "and is learned as haze around what does; leave it out by masks that are black there",
+        "{:.0f} % of the edges in photos stand at the same pixels of {} of {} of them, though by "
+        "their poses the cameras moved: what is behind a turntable does not turn with it, and is "
+        "learned as haze around what does; leave it out by masks that are black there",
         100 * ground->edges, ground->photos, read.size());
     return;
   }
