@@ -91,11 +91,12 @@ ExecutedCounts SceneBench::counts(bool grouped) {
   const PacketLayout layout = packet_layout(self.context.device(), trace);
   const auto across = [&](int size, int part) { return (size + part - 1) / part; };
   const Camera& camera = self.model.camera;
-  out.packets = static_cast<double>(across(camera.width, layout.width)) *
-                across(camera.height, layout.height);
+  const int packets = across(camera.width, layout.width) * across(camera.height, layout.height);
+  out.packets = packets;
   const auto tiles =
       static_cast<unsigned>(across(camera.width, layout.tile) * across(camera.height, layout.tile));
-  out.sort_passes = (16 + static_cast<int>(std::bit_width(tiles - 1)) + 7) / 8;
+  const int sort_passes = (16 + static_cast<int>(std::bit_width(tiles - 1)) + 7) / 8;
+  out.sort_passes = sort_passes;
   CameraTracer tracer(self.context, trace);
   count_view(tracer, self.gaussians(), camera, out);
   DeviceInfo device = self.context.device();

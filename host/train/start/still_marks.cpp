@@ -266,8 +266,9 @@ double share_apart(std::span<const SmallPhoto> photos, std::span<const std::size
   std::vector<char> apart(std::min(kPlaces, pixels.size()), 0);
   in_parallel(apart.size(), [&](std::size_t i) {
     const std::size_t pixel = pixels[i * pixels.size() / apart.size()];
-    const auto x = static_cast<double>(pixel % width), y = static_cast<double>(pixel / width);
-    apart[i] = may_be_seen(photos, {x + 0.5, y + 0.5}, extent) ? 0 : 1;
+    const std::size_t x = pixel % width, y = pixel / width;
+    const glm::dvec2 middle = glm::dvec2(x, y) + 0.5;
+    apart[i] = may_be_seen(photos, middle, extent) ? 0 : 1;
   });
   return static_cast<double>(std::count(apart.begin(), apart.end(), 1)) /
          static_cast<double>(apart.size());
@@ -361,6 +362,7 @@ std::optional<StillGround> still_ground(std::span<const SmallPhoto> all) {
   const std::vector<std::size_t> still = still_edges(edges, alike);
   if (still.empty()) return std::nullopt;
   std::vector<SmallPhoto> group;
+  group.reserve(alike.size());
   for (const std::size_t i : alike) group.push_back(photos[i]);
   const std::vector<glm::vec2>& first = edges[alike.front()];
   const double share = static_cast<double>(still.size()) /
