@@ -62,9 +62,11 @@ Beside photos_beside(const PointCloud& points,
                      std::span<const Camera> cameras,
                      const PhotoSource& photos,
                      const TrainOptions& options) {
-  constexpr double kMostlyBare = 0.31;    // of what photos show, in wide cells with no sparse point
-  constexpr double kMostlyShown = 0.75;   // of the photos, where masks leave out the rest
-  constexpr double kMostlyAgreed = 0.21;  // of what photos show, in one depth
+  constexpr double kMostlyBare = 0.31;   // of what photos show, in wide cells with no sparse point
+  constexpr double kMostlyShown = 0.75;  // of the photos, where masks leave out the rest
+  // Of what photos show, in one depth: below this much it is wrong too often, as in foliage and on
+  // streets, from that much on it is mostly right.
+  constexpr double kMostlyAgreed = 0.21, kSurelyAgreed = 0.30;
   constexpr double kMostlyCovered = 0.72;  // of what agrees in one depth, with sparse points near
   if (options.init != "auto" || points.size() < kFewPoints) return {};
   const double bare = bare_share(points, photos(PhotoChoice::kSome));
@@ -93,7 +95,9 @@ Beside photos_beside(const PointCloud& points,
   const double covered =
       told.size() > 0 ? static_cast<double>(near) / static_cast<double>(told.size()) : 1;
   spdlog::debug("{:.1f} % of that has sparse points", 100 * covered);
-  return {covered < kMostlyCovered ? Beside::Part::kAll : Beside::Part::kInTheirPlaces, depths};
+  if (covered < kMostlyCovered) return {Beside::Part::kAll, depths};
+  const double sure = (probe.agreed - kMostlyAgreed) / (kSurelyAgreed - kMostlyAgreed);
+  return {Beside::Part::kInTheirPlaces, depths, std::min(sure, 1.0)};
 }
 
 std::string match_text(const PointMatch& match) {
@@ -182,7 +186,7 @@ SparseStart sparse_start(const Dataset& dataset,
   out.points = start_points(dataset, cameras, photos, count, options);
   out.beside = photos_beside(out.points, dataset, cameras, photos, options);
   const bool in_their_places = out.beside.part == Beside::Part::kInTheirPlaces;
-  out.count = in_their_places ? std::min(count, kMostBeside) : count;
+  out.count = in_their_places ? share_of(std::min(count, kMostBeside), out.beside.weight) : count;
   const bool alone = out.beside.part == Beside::Part::kNothing;
   const std::size_t half = share_of(limit, kStartShare);
   const std::size_t others = half - std::min(out.count, half);

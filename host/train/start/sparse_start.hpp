@@ -29,6 +29,7 @@ struct Beside {
   enum class Part { kNothing, kAll, kInTheirPlaces };
   Part part = Part::kNothing;
   std::optional<DepthRange> depths;
+  double weight = 1;  ///< of the usual number of points
 };
 
 /// What sparse points give to a start.

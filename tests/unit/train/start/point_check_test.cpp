@@ -267,6 +267,31 @@ TEST_CASE("points of photos that tell of depth stand beside sparse ones, in thei
   CHECK(probe_sweep({}, {0.6, 3.0, 30.0}, 5).agreed == 0.0);
 }
 
+TEST_CASE("the less photos tell of depth, the fewer of their points stand beside sparse ones") {
+  std::size_t before = 0;
+  for (const double top : {-0.85, 0.0}) {
+    // The wall is white above.
+    const auto partly_white = [top](const CameraRay& ray) {
+      const double t = (4.0 - ray.origin.x) / ray.direction.x;
+      return ray.origin.z + t * ray.direction.z > top ? glm::dvec4(0.9, 0.9, 0.9, 1.0) : wall(ray);
+    };
+    std::vector<SmallPhoto> photos;
+    for (const SmallPhoto& photo : photos_of_wall())
+      photos.push_back(photo_of(photo.camera, partly_white));
+    Dataset dataset;
+    dataset.points = points_below(top);
+    const Gaussians model = initial_model(
+        dataset, cameras_of(photos), [&photos](PhotoChoice) -> const auto& { return photos; }, 2000,
+        {});
+    std::size_t added = 0;
+    for (std::size_t i = 0; i < model.size(); ++i) added += model.means[3 * i] != 4.0f ? 1 : 0;
+    MESSAGE(probe_sweep(photos, {0.6, 3.0, 30.0}, 5).agreed << " agrees: " << added << " of "
+                                                            << model.size());
+    CHECK(added > 5 * before / 4);
+    before = added;
+  }
+}
+
 TEST_CASE("of a cloud that is mostly out of sight the start takes what the photos see") {
   const std::vector<SmallPhoto> photos = photos_of_wall();
   const std::vector<Camera> cameras = cameras_of(photos);
