@@ -126,11 +126,13 @@ std::vector<std::string> own_arguments(int argc, const char* const* argv) {
        {"--max-num-iterations", "--iterations"},
        {"--output-dir", "--output"}}};
   std::vector<std::string> arguments;
+  bool trains = false;  // elsewhere these names would mean other things: 3DGS renders a model_path
   for (int i = 1; i < argc; ++i) {
     std::string word = argv[i];
+    trains = trains || word == "train";
     const std::string_view name = std::string_view(word).substr(0, word.find('='));
     for (const auto& [foreign, own] : kForeign) {
-      if (name != foreign) continue;
+      if (!trains || name != foreign) continue;
       word.replace(0, foreign.size(), own);
       break;
     }
@@ -160,7 +162,7 @@ std::string explain(const CLI::ParseError& error, const CLI::App& app) {
       return unknown("option " + name, nearest_name(name, known), help);
     }
     if (parsed.empty()) {
-      return unknown("command " + text, nearest_name(text, command_names(app)), help);
+      return unknown("command " + shell_word(text), nearest_name(text, command_names(app)), help);
     }
     return fmt::format("Unexpected argument '{}': '{}' shows what {} takes", text, help,
                        command.get_name());

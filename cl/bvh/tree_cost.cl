@@ -35,19 +35,6 @@ float group_sum(float own, __local float* scratch) {
   return own;
 }
 
-#if !TRAIL
-float node_area(__global const fv* node, __global const float* window) {
-  const fv x = RS_CLIPPED_SIDE(node[0], node[3], 0);
-  const fv y = RS_CLIPPED_SIDE(node[1], node[4], 1);
-  const fv z = RS_CLIPPED_SIDE(node[2], node[5], 2);
-  const fv area = x * y + y * z + z * x;
-  const iv counts =
-      RS_MASK(x >= 0.0f) & RS_MASK(y >= 0.0f) & RS_MASK(z >= 0.0f) & RS_MASK(area <= FLT_MAX);
-  return rs_lane_sum(select((fv)(0.0f), area, counts));
-}
-
-#endif
-
 float box_area(const RsBox box, __global const float* window) {
   const float x = RS_CLIPPED_SIDE(box.lo.x, box.hi.x, 0);
   const float y = RS_CLIPPED_SIDE(box.lo.y, box.hi.y, 1);
@@ -56,14 +43,22 @@ float box_area(const RsBox box, __global const float* window) {
   return x >= 0.0f && y >= 0.0f && z >= 0.0f && area <= FLT_MAX ? area : 0.0f;
 }
 
-#if TRAIL
 float node_area(__global const fv* node, __global const float* window) {
+#if TRAIL
   float sum = 0.0f;
   for (uint k = 0; k < LANES; ++k)
     sum += box_area(load_child((__global const float*)node, 0, k), window);
   return sum;
-}
+#else
+  const fv x = RS_CLIPPED_SIDE(node[0], node[3], 0);
+  const fv y = RS_CLIPPED_SIDE(node[1], node[4], 1);
+  const fv z = RS_CLIPPED_SIDE(node[2], node[5], 2);
+  const fv area = x * y + y * z + z * x;
+  const iv counts =
+      RS_MASK(x >= 0.0f) & RS_MASK(y >= 0.0f) & RS_MASK(z >= 0.0f) & RS_MASK(area <= FLT_MAX);
+  return rs_lane_sum(select((fv)(0.0f), area, counts));
 #endif
+}
 
 // `window` is the grid that choose_grid made.
 __kernel __attribute__((reqd_work_group_size(GROUP, 1, 1))) void sum_node_areas(

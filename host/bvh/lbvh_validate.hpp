@@ -31,6 +31,7 @@ struct LbvhCopy {
   std::vector<float> nodes;
 
   static LbvhCopy of(const Lbvh& tree);
+  TreeForm form() const { return {static_cast<int>(lanes), trail}; }
   /// Place in `nodes` of number k of child `lane` of a node: least x y z, greatest x y z.
   std::size_t at(std::size_t node, std::size_t k, std::size_t lane) const;
   /// Box of child `lane` of a node, numbered through all levels.

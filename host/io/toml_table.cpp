@@ -429,9 +429,11 @@ void TomlTable::finish() const {
   for (const auto& [name, node] : *table_) {
     const std::string key = dashed(name.str());
     if (known_.contains(key)) continue;
-    throw UsageError(fmt::format("{}, line {}: unknown key '{}' in {}{}", file_->string(),
-                                 node.source().begin.line, name.str(), name_,
-                                 did_you_mean(key, {known_.begin(), known_.end()})));
+    throw UsageError(
+        fmt::format("{}, line {}: unknown key '{}' in {}{}", file_->string(),
+                    node.source().begin.line, name.str(), name_,
+                    did_you_mean(key, {known_.begin(), known_.end()},
+                                 fmt::format(": use one of {}", fmt::join(known_, ", ")))));
   }
 }
 

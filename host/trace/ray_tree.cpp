@@ -18,7 +18,7 @@ constexpr std::size_t kGroup = 64;
 }  // namespace
 
 std::size_t RayTree::block_floats(const TraceOptions& options, const TreeForm& form) {
-  return RS_GAUSSIAN_VECTORS(options.adaptive_radius || form.trail ? 1 : 0);
+  return RS_GAUSSIAN_VECTORS(has_quantiles(options, form) ? 1 : 0);
 }
 
 RayTree::RayTree(Context& context, const TraceOptions& options, const TreeForm& form)

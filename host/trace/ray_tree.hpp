@@ -18,6 +18,10 @@ class RayTree {
 
   /// Floats that a Gaussian has in its leaf block.
   static std::size_t block_floats(const TraceOptions& options, const TreeForm& form);
+  /// Whether a Gaussian's squared radius is among them.
+  static bool has_quantiles(const TraceOptions& options, const TreeForm& form) {
+    return options.adaptive_radius || form.trail;
+  }
 
   void build(const DeviceGaussians& gaussians);
   /// Follows Gaussians that changed but kept their number since build(). Throws UsageError

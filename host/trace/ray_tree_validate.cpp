@@ -101,7 +101,7 @@ RayTreeCopy RayTreeCopy::of(const RayTree& tree) {
 }
 
 std::size_t RayTreeCopy::index_at(std::size_t slot) const {
-  return at(slot, RS_GAUSSIAN_INDEX(options.adaptive_radius || tree.trail ? 1 : 0));
+  return at(slot, RS_GAUSSIAN_INDEX(RayTree::has_quantiles(options, tree.form()) ? 1 : 0));
 }
 
 std::size_t RayTreeCopy::mean_at(std::size_t slot, std::size_t axis) const {
@@ -110,7 +110,7 @@ std::size_t RayTreeCopy::mean_at(std::size_t slot, std::size_t axis) const {
 
 std::size_t RayTreeCopy::at(std::size_t slot, std::size_t k) const {
   const std::size_t lanes = tree.lanes;
-  const std::size_t vectors = RayTree::block_floats(options, {static_cast<int>(lanes), tree.trail});
+  const std::size_t vectors = RayTree::block_floats(options, tree.form());
   // RS_LANE_FLOAT of cl/bvh/lbvh_node.h.
   return tree.trail ? slot * vectors + k : (slot / lanes * vectors + k) * lanes + slot % lanes;
 }

@@ -18,6 +18,7 @@
 #include "train/start/flat_start.hpp"
 #include "train/start/grey_photos.hpp"
 #include "train/start/mask_check.hpp"
+#include "train/start/still_ground.hpp"
 #include "train/start/still_marks.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
@@ -147,8 +148,9 @@ void warn_of_marks(const Dataset& dataset,
   if (const auto ground = still_ground(read)) {
     spdlog::warn(
         "{:.0f} % of the edges in photos stand at the same pixels of {} of {} of them, though by "
-        "their poses the cameras moved: what is behind a turntable does not turn with it, and is "
-        "learned as haze around what does; leave it out by masks that are black there",
+        "their poses the cameras moved: what stands behind a turntable, or goes along with the "
+        "camera, is learned as haze; leave it out by masks that are black there, or by "
+        "--ignore-areas",
         100 * ground->edges, ground->photos, read.size());
     return;
   }

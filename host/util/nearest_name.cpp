@@ -10,7 +10,8 @@
 namespace raysplats {
 namespace {
 
-constexpr std::size_t kFew = 12;  // names that a message lists
+constexpr std::size_t kFew = 12;       // names that a message lists
+constexpr std::size_t kLeastPart = 4;  // letters of a name that tell which is meant
 
 std::size_t levenshtein(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
@@ -27,15 +28,25 @@ std::size_t levenshtein(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
+std::string_view without_dashes(std::string_view name) {
+  return name.substr(std::min(name.find_first_not_of('-'), name.size()));
+}
+
+bool holds(std::string_view whole, std::string_view part) {
+  return part.size() >= kLeastPart && whole.find(part) != std::string_view::npos;
+}
+
 }  // namespace
 
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates) {
+  const std::string_view bare = without_dashes(name);
+  const std::size_t near = 1 + bare.size() / 4;
   std::string best;
-  const std::size_t dashes = std::min(name.find_first_not_of('-'), name.size());
-  std::size_t distance = 2 + (name.size() - dashes) / 4;
+  std::size_t distance = static_cast<std::size_t>(-1);
   for (const std::string& candidate : candidates) {
     const std::size_t d = levenshtein(name, candidate);
-    if (d < distance) {
+    if (d < distance &&
+        (d <= near || holds(candidate, bare) || holds(name, without_dashes(candidate)))) {
       distance = d;
       best = candidate;
     }
@@ -48,10 +59,16 @@ std::string did_you_mean(std::string_view name,
                          const std::string& otherwise) {
   const std::string nearest = nearest_name(name, candidates);
   if (!nearest.empty()) return fmt::format(": did you mean '{}'?", nearest);
-  if (candidates.empty() || candidates.size() > kFew) return otherwise;
-  const auto last = candidates.end() - 1;
-  if (last == candidates.begin()) return fmt::format(": use '{}'", *last);
-  return fmt::format(": use '{}' or '{}'", fmt::join(candidates.begin(), last, "', '"), *last);
+  std::vector<std::string> names;
+  for (const std::string& candidate : candidates) {
+    if (!candidate.empty() && std::find(names.begin(), names.end(), candidate) == names.end())
+      names.push_back(candidate);
+  }
+  if (names.empty() || names.size() > kFew) return otherwise;
+  const std::string last = names.back();
+  names.pop_back();
+  if (names.empty()) return fmt::format(": use '{}'", last);
+  return fmt::format(": use '{}' or '{}'", fmt::join(names, "', '"), last);
 }
 
 }  // namespace raysplats

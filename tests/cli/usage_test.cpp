@@ -47,6 +47,11 @@ TEST_CASE("the names of other trainers for data, output and iterations are under
   }
 }
 
+TEST_CASE("the names of other trainers are those of train alone") {
+  check_refused({"eval", "--model_path", "run"}, 2, "Unknown option --model_path");
+  check_refused({"info", "data", "--output-dir", "x"}, 2, "Unknown option --output-dir");
+}
+
 TEST_CASE("a wrong command line is one sentence, exit code 2") {
   check_refused({}, 2, "No command given: use one of devices, ");
   CHECK_FALSE(contains(raysplats_program({}).err, "compile-kernels"));
@@ -58,6 +63,10 @@ TEST_CASE("a wrong command line is one sentence, exit code 2") {
   check_refused({"render", "m.ply", "--loglevel=info", "-o", "x"}, 2, "did you mean --log-level");
   check_refused({"train", "data", "-o", "x", "--ssim-wieght", "0.1"}, 2,
                 "did you mean --ssim-weight");
+  check_refused({"train", "data", "-o", "x", "--white-background"}, 2,
+                "did you mean --background?");
+  check_refused({"evaluate"}, 2, "Unknown command evaluate: did you mean eval?");
+  check_refused({""}, 2, "Unknown command '': 'raysplats -h' lists all");
   check_refused({"train", "data", "-o", "x", "--epochs", "3"}, 2,
                 "Unknown option --epochs: 'raysplats train -h' lists all");
   check_refused({"train", "data", "-o", "x", "--time", "0"}, 2, "no time to train in");

@@ -52,6 +52,11 @@ std::vector<std::string> words(nb::handle value) {
   return out;
 }
 
+[[noreturn]] void refuse_option(const std::string& key, const std::vector<std::string>& names) {
+  throw UsageError(fmt::format("unknown option '{}'{}", key,
+                               did_you_mean(key, names, ": docs/cli.md lists those of train")));
+}
+
 void set_option(TrainOptions& options, std::string key, nb::handle value) {
   std::replace(key.begin(), key.end(), '_', '-');
   std::vector<std::string> names;
@@ -59,9 +64,7 @@ void set_option(TrainOptions& options, std::string key, nb::handle value) {
     if (known.name == key) return known.set(words(value));
     names.push_back(known.name);
   }
-  if (take_retired_key(key)) return;
-  throw UsageError(fmt::format("unknown option '{}'{}", key,
-                               did_you_mean(key, names, ": 'raysplats train -h' lists all")));
+  if (!take_retired_key(key)) refuse_option(key, names);
 }
 
 std::string option_text(TrainOptions& options, std::string key) {
@@ -71,8 +74,7 @@ std::string option_text(TrainOptions& options, std::string key) {
     if (known.name == key) return known.text();
     names.push_back(known.name);
   }
-  throw UsageError(fmt::format("unknown option '{}'{}", key,
-                               did_you_mean(key, names, ": 'raysplats train -h' lists all")));
+  refuse_option(key, names);
 }
 
 void make_options(TrainOptions* self,

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <glm/vec2.hpp>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -29,18 +28,6 @@ struct StillMark {
 /// lies where the cameras' rays through these pixels meet (what all look at, or far away from
 /// cameras that do not turn). At least twelve photos of one size tell.
 std::vector<StillMark> still_marks(std::span<const SmallPhoto> photos);
-
-/// What stands still in photos though their cameras are said to move.
-struct StillGround {
-  std::size_t photos = 0;  ///< those of one kind that have it
-  double edges = 0;        ///< the share of what has edges in one of these
-};
-
-/// The ground behind a body that turned before a camera which stood, whose poses say that it went
-/// around: large parts that are the same at the same pixels, though the cameras' rays through them
-/// meet nowhere. It may be another for each height of the camera, so groups of alike photos tell,
-/// of five or more; nothing where there is no such ground.
-std::optional<StillGround> still_ground(std::span<const SmallPhoto> photos);
 
 /// The box of a photo on disk, taken by `photo`, that holds a mark of its pictures, which `picture`
 /// has taken (of StillMark::size), with a rim for what is faint. In thousandths of its sides.

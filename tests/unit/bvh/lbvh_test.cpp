@@ -349,8 +349,11 @@ TEST_CASE("lbvh: a refit has the boxes of a rebuild and keeps the order") {
 
 TEST_CASE("lbvh: cost equals the sum over the nodes and tells an outdated order [small]") {
   Context context = make_test_context();
-  for (const ChunkShape& shape : {ChunkShape{3, 1, 16}, ChunkShape{2, 16, 16}}) {
-    Tree tree(context, TreeForm{8, false}, shape);
+  for (const auto& [shape, form] : {std::pair{ChunkShape{3, 1, 16}, TreeForm{8, false}},
+                                    {ChunkShape{2, 16, 16}, TreeForm{16, false}},
+                                    {ChunkShape{2, 16, 16}, TreeForm{4, true}}}) {
+    CAPTURE(form);
+    Tree tree(context, form, shape);
     CHECK(tree.cost({}) == 0);
     Boxes boxes = random_boxes(700, 0.1, 41);
     // The window of the grid, to which boxes are clipped, holds them all.

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "train/start/still_ground.hpp"
 #include "unit/train/test_photos.hpp"
 
 using namespace raysplats;
@@ -141,6 +142,37 @@ TEST_CASE("a ground that does not turn with a turntable is told, of two heights 
   const auto half = still_ground(photos_by(two, on_turntable));
   REQUIRE(half.has_value());
   CHECK(half->photos == 8);
+}
+
+TEST_CASE("a ground is told whichever photo is unlike the others") {
+  for (const std::size_t odd : {std::size_t{0}, std::size_t{7}}) {
+    CAPTURE(odd);
+    std::vector<SmallPhoto> photos = photos_by(around(16), on_turntable);
+    // A hand before most of the ground.
+    photos[odd] = photos_by({photos[odd].camera}, [](const CameraRay& ray, int x, int y) {
+                    return x < 330 ? pattern(ray, x, y) : on_turntable(ray, x, y);
+                  }).front();
+    const auto ground = still_ground(photos);
+    REQUIRE(ground.has_value());
+    CHECK(ground->photos >= 15);
+    CHECK(ground->edges > 0.3);
+  }
+}
+
+TEST_CASE("what is round looks the same from all sides and is no ground") {
+  const auto vase = [](const CameraRay&, int x, int y) {
+    const double across = x - 200;
+    const bool body = std::abs(across) < 70 && y > 60;
+    const bool groove = static_cast<int>((y - 0.002 * across * across) / 20) % 2 == 0;
+    return glm::dvec4(glm::dvec3(body ? (groove ? 0.3 : 0.6) : 0.9), 1);
+  };
+  const auto plate = [](const CameraRay&, int x, int y) {
+    const double radius = std::hypot(x - 200.0, (y - 150.0) / 0.4);
+    const bool ring = static_cast<int>(radius / 15) % 2 == 0;
+    return glm::dvec4(glm::dvec3(radius < 180 ? (ring ? 0.3 : 0.6) : 0.9), 1);
+  };
+  CHECK_FALSE(still_ground(photos_by(around(16), vase)).has_value());
+  CHECK_FALSE(still_ground(photos_by(around(16), plate)).has_value());
 }
 
 TEST_CASE("no ground stands still around a camera that moves, beside masks, or that is plain") {
