@@ -40,7 +40,7 @@ bool holds(std::string_view whole, std::string_view part) {
 
 std::string nearest_name(std::string_view name, const std::vector<std::string>& candidates) {
   const std::string_view bare = without_dashes(name);
-  const std::size_t near = 1 + bare.size() / 4;
+  const std::size_t near = 1 + (bare.size() + 1) / 4;
   std::string best;
   std::size_t distance = static_cast<std::size_t>(-1);
   for (const std::string& candidate : candidates) {

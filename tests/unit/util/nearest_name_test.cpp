@@ -14,6 +14,7 @@ TEST_CASE("nearest name: misspellings find their name") {
   CHECK(nearest_name("seed", names) == "seed");
   CHECK(nearest_name("--max-hit", {"--max-hits", "--mask"}) == "--max-hits");
   CHECK(nearest_name("epochs", names) == "");  // nothing that could be meant
+  CHECK(nearest_name("fvo", {"fov", "width"}) == "fov");
   CHECK(nearest_name("--run", {"--q"}) == "");
   CHECK(nearest_name("--iter", {"--exit", "--iterations"}) == "--iterations");
   CHECK(nearest_name("--white-background", {"--background", "--sh-degree"}) == "--background");
