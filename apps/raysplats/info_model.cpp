@@ -37,6 +37,7 @@ Json describe(const TraceOptions& trace) {
           {"near_depth", trace.near_depth},
           {"min_transmittance", trace.min_transmittance},
           {"max_hits", trace.max_hits},
+          {"view_footprint", trace.view_footprint},
           {"background", trace.background}};
 }
 
@@ -96,9 +97,10 @@ void print_model(const std::filesystem::path& path) {
   }
   print(summary);
   if (source.header) {
-    fmt::print("traced           in {} order, quantile {:.4g}, {} radius\n",
+    fmt::print("traced           in {} order, quantile {:.4g}, {} radius, view footprint {:.4g}\n",
                hit_order_name(source.header->hit_order), source.header->quantile,
-               source.header->adaptive_radius ? "adaptive" : "whole");
+               source.header->adaptive_radius ? "adaptive" : "whole",
+               source.header->view_footprint);
     if (source.sky.empty())
       fmt::print("background       {}\n", fmt::join(source.header->background, ", "));
   }

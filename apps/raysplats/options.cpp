@@ -93,7 +93,8 @@ CLI::Option* add_setting(CLI::App& app,
 
 void add_trace_flags(CLI::App& app, TraceSettings& settings) {
   add_setting(app, settings, "quantile", "--q");
-  for (const char* name : {"min-transmittance", "max-hits", "hit-order", "adaptive-radius", "near"})
+  for (const char* name :
+       {"min-transmittance", "max-hits", "hit-order", "adaptive-radius", "near", "view-footprint"})
     add_setting(app, settings, name);
   add_setting(app, settings, "background")->type_name("R,G,B");
   for (const char* name : {"packet-shape", "packet-width", "memory-budget", "launch-budget-ms"})

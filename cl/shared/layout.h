@@ -37,6 +37,12 @@ typedef struct {
 } RsViewBounds;
 RS_STATIC_ASSERT_SIZE(RsViewBounds, 32);
 
+// The power of the growth of its outline by which a Gaussian becomes fainter whose axes are raised
+// to RsCamera::footprint: 1 would keep what it adds to all pixels together, were it alone. Those of
+// trained models lie on each other, and together show less than the sum (docs/experiments.md). Half
+// of it is taken by roots in view_footprint.h.
+#define RS_FOOTPRINT_POWER 1.25f
+
 // Pinhole camera of one view. Camera axes: x right, y down, z forward.
 typedef struct {
   rs_float rotation[9];  // world to camera, row-major
@@ -44,7 +50,7 @@ typedef struct {
   rs_float fx, fy, cx, cy;
   rs_int width, height;
   rs_float near_depth;  // Gaussians whose mean is nearer along z are skipped; 0 = off
-  rs_int padding;
+  rs_float footprint;   // least standard deviation per unit of depth, or of distance around
 } RsCamera;
 RS_STATIC_ASSERT_SIZE(RsCamera, 80);
 

@@ -24,7 +24,7 @@
     FIELD(RsViewBounds, kind) FIELD(RsViewBounds, padding) \
   RECORD(RsCamera) FIELD(RsCamera, rotation) FIELD(RsCamera, center) FIELD(RsCamera, fx) \
     FIELD(RsCamera, fy) FIELD(RsCamera, cx) FIELD(RsCamera, cy) FIELD(RsCamera, width) \
-    FIELD(RsCamera, height) FIELD(RsCamera, near_depth) FIELD(RsCamera, padding) \
+    FIELD(RsCamera, height) FIELD(RsCamera, near_depth) FIELD(RsCamera, footprint) \
   RECORD(RsFootprintView) FIELD(RsFootprintView, rotation) FIELD(RsFootprintView, center) \
     FIELD(RsFootprintView, low) FIELD(RsFootprintView, high) FIELD(RsFootprintView, spacing) \
     FIELD(RsFootprintView, kind) FIELD(RsFootprintView, padding) \

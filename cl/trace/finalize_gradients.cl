@@ -109,6 +109,11 @@ __kernel void finalize_gradients(RS_FINALIZE_ARGUMENTS) {
 #if DEPTH_GRADIENT
   view.m[2] += depth;
 #endif
+#if VIEW_FOOTPRINT
+  FootprintGradient rest;
+  axis_footprint_gradient(&g, v[12], &view, &rest);
+  mean_footprint_gradient(&g, &rest, &view);
+#endif
   fv seen[3];
   screen_statistics(&g, v, touched, kind, finalize.screen_x, finalize.screen_y, seen);
 #if ACCUMULATE

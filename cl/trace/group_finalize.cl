@@ -9,6 +9,7 @@
 #ifndef GROUP
 #define GROUP 64
 #endif
+#include "parallel/wave.h"
 #include "trace/arguments.h"
 #include "trace/staged_rows.h"
 #include "trace/view_gradient.h"
@@ -117,10 +118,12 @@ void unpark(const __local float* row, ViewGaussian* g, float* mean) {
   for (int j = 0; j < 4; ++j) g->q[j] = row[9 + j];
   g->q_norm = row[13];
   g->logit = row[14];
+#if !VIEW_FOOTPRINT
   g->opacity = rs_sigmoid(g->logit);
+#endif
 }
 
-__attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
+RS_WAVE_OF_16 __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
     RS_FINALIZE_ARGUMENTS) {
 #if !POSE
   (void)pose;
@@ -207,6 +210,15 @@ __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
   view_gradient(&g, v, touched, kind, &view);
 #if DEPTH_GRADIENT
   view.m[2] += depth;
+#endif
+#if VIEW_FOOTPRINT
+  barrier(CLK_LOCAL_MEM_FENCE);  // as in park()
+  for (int j = 0; j < 3; ++j) g.raw_scale[j] = row[3 + j];
+  g.logit = row[14];
+  FootprintGradient rest;
+  axis_footprint_gradient(&g, v[12], &view, &rest);
+  barrier(CLK_LOCAL_MEM_FENCE);
+  mean_footprint_gradient(&g, &rest, &view);
 #endif
   unpark(row, &g, out.mean);
   parameter_gradient(&g, &view, v[12], touched, &camera, &out);

@@ -13,10 +13,6 @@
 #define PEAK_ORDER 0
 #endif
 
-#ifndef LENS
-#define LENS RS_LENS_PINHOLE
-#endif
-
 // Slack for float rounding in the closed-form outline, in units of the tangent coordinate.
 #define RS_OUTLINE_SLACK 2e-6f
 
@@ -185,6 +181,9 @@ prepare_view(const uint begin,
   const RsCamera camera = camera_argument;
   ViewGaussian g;
   const iv finite = load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
+#if VIEW_FOOTPRINT
+  dilute_opacity(&g);
+#endif
   const fv Q = effective_quantile(quantile, g.opacity);
   fv szz = 0, whitened = 0;
   for (int k = 0; k < 3; ++k) {

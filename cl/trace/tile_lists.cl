@@ -126,8 +126,17 @@ float4 tile_box(const RsCamera* camera, const int tile_x, const int tile_y) {
                       camera->fy);
 }
 
+// How far beyond its box a Gaussian may reach whose axes are raised to the view's footprint
+// (view_footprint.h), in footprints: the root of the largest quantile that is possible.
+#define RS_FOOTPRINT_REACH 10.0f
+
 // Whether the planes of a tile's frustum keep the box out; it may still be outside when not.
 bool box_outside(const RsCamera* camera, const float4 tile, __global const RsAabb* box) {
+  float beyond = 0.0f;
+  for (int j = 0; j < 3 && camera->footprint > 0.0f; ++j) {
+    beyond += RS_FOOTPRINT_REACH * camera->footprint *
+              fmax(fabs(box->lo[j] - camera->center[j]), fabs(box->hi[j] - camera->center[j]));
+  }
   // Inward normals in camera axes: left, right, top, bottom, front.
   const float n[5][3] = {
       {1, 0, -tile.x}, {-1, 0, tile.z}, {0, 1, -tile.y}, {0, -1, tile.w}, {0, 0, 1}};
@@ -141,7 +150,8 @@ bool box_outside(const RsCamera* camera, const float4 tile, __global const RsAab
       most += fmax(lo, hi);
       scale += fabs(lo) + fabs(hi);
     }
-    if (most < -1e-5f * scale) return true;
+    const float length = fabs(n[p][0]) + fabs(n[p][1]) + fabs(n[p][2]);
+    if (most < -1e-5f * scale - beyond * length) return true;
   }
   return false;
 }

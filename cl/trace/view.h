@@ -15,6 +15,13 @@
 #ifndef SH_COEFFICIENTS
 #define SH_COEFFICIENTS ((SH_DEGREE + 1) * (SH_DEGREE + 1))
 #endif
+// With 1 no axis is thinner than the view's footprint (view_footprint.h).
+#ifndef VIEW_FOOTPRINT
+#define VIEW_FOOTPRINT 0
+#endif
+#ifndef LENS
+#define LENS RS_LENS_PINHOLE
+#endif
 #define RS_SH_FUNCTIONS ((SH_DEGREE + 1) * (SH_DEGREE + 1))
 #define RS_SH_REAL fv
 #include "shared/sh.h"
@@ -30,7 +37,7 @@ typedef struct {
   fv m[3];       // mean, camera axes
   fv offset[3];  // mean minus camera centre, world axes
   fv axis[9];    // columns r_k of the rotation in camera axes, axis[3 k + j]
-  fv scale[3];   // standard deviations, floored
+  fv scale[3];   // standard deviations, raised to the least one
   fv w[3];       // 1 / scale
   fv raw_scale[3];
   fv q[4];  // unit quaternion
@@ -38,6 +45,20 @@ typedef struct {
   fv logit;  // of the opacity
   fv opacity;
 } ViewGaussian;
+
+// Distance of the mean from the camera.
+fv view_distance(const ViewGaussian* g) {
+  return sqrt(g->m[0] * g->m[0] + g->m[1] * g->m[1] + g->m[2] * g->m[2]);
+}
+
+// No axis is treated as thinner than this.
+fv thinnest_axis(const fv distance) {
+  return larger(RS_MIN_RELATIVE_SCALE * distance, (fv)(1e-12f));
+}
+
+#if VIEW_FOOTPRINT
+#include "trace/view_footprint.h"
+#endif
 
 // Means minus camera centre of the Gaussians from number i on.
 void load_offset(const size_t i, __global const float* means, const RsCamera* camera, fv* offset) {
@@ -68,13 +89,17 @@ iv load_view_gaussian(const size_t i,
       g->axis[3 * k + j] = V[3 * j] * R[k] + V[3 * j + 1] * R[3 + k] + V[3 * j + 2] * R[6 + k];
     }
   }
-  const fv distance = sqrt(g->m[0] * g->m[0] + g->m[1] * g->m[1] + g->m[2] * g->m[2]);
-  const fv floor_scale = larger(RS_MIN_RELATIVE_SCALE * distance, (fv)(1e-12f));
+  const fv distance = view_distance(g);
+#if VIEW_FOOTPRINT
+  const fv least = larger(thinnest_axis(distance), footprint_axis(g, camera));
+#else
+  const fv least = thinnest_axis(distance);
+#endif
   fv sum = distance + g->q_norm;
   load_columns3(scales + 3 * i, g->raw_scale);
   for (int k = 0; k < 3; ++k) {
     g->raw_scale[k] = rs_scale_of(g->raw_scale[k]);
-    g->scale[k] = larger(g->raw_scale[k], floor_scale);
+    g->scale[k] = larger(g->raw_scale[k], least);
     g->w[k] = 1.0f / g->scale[k];
     sum += g->raw_scale[k];
   }

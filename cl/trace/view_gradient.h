@@ -9,11 +9,6 @@
 #include "shared/color.h"
 #include "trace/view.h"
 
-// The screen gradient of RS_LENS_AROUND counts the angle in which the mean is seen.
-#ifndef LENS
-#define LENS RS_LENS_PINHOLE
-#endif
-
 // The lines' gradients have that of m_z in the slot of D0 (line_gradient.h).
 #ifndef DEPTH_GRADIENT
 #define DEPTH_GRADIENT 0
@@ -215,6 +210,64 @@ typedef struct {
   fv opacity;
 } ParameterGradient;
 
+#if VIEW_FOOTPRINT
+// Gradients of the parts of the mean along the axes, and of the logarithm of the footprint.
+typedef struct {
+  fv along[3];
+  fv size;
+} FootprintGradient;
+
+// Where axes were raised to the footprint (view_footprint.h): makes the gradients of the raised
+// axes those of the own ones. `opacity` holds the gradient of what is left of the opacity, which g
+// gets.
+void axis_footprint_gradient(ViewGaussian* g,
+                             const fv opacity,
+                             ViewGradient* out,
+                             FootprintGradient* rest) {
+  FootprintShares s;
+  footprint_shares(g, &s);
+  g->opacity = rs_sigmoid(g->logit) * footprint_dilution(&s);
+  const fv by_area = RS_FOOTPRINT_POWER * opacity * g->opacity;  // of the area's logarithm
+  const fv inverse_kept = 1.0f / s.kept;
+  const fv inverse_whitened = 1.0f / s.whitened;
+  rest->size = 0;
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+    const fv w = g->w[k];
+    const fv q = s.along[k] * w;
+    const fv share = q * q * inverse_whitened;
+    const fv grown = footprint_pair(&s, k) * inverse_kept;
+    const iv raised = footprint_raised(&s, k);
+    const fv by_axis = -out->w[k] * w - by_area * (1.0f - share);
+    rest->size += raised ? by_axis : (fv)(0.0f);
+    const fv own = (raised ? (fv)(0.0f) : by_axis) + by_area * (1.0f - share * grown);
+    out->w[k] = -own / w;
+    rest->along[k] = by_area * (grown - 1.0f) * q * w * inverse_whitened;
+  }
+}
+
+// Adds what is left to the gradients of the rotation and the mean.
+void mean_footprint_gradient(const ViewGaussian* g,
+                             const FootprintGradient* rest,
+                             ViewGradient* out) {
+#pragma unroll
+  for (int k = 0; k < 3; ++k) {
+#pragma unroll
+    for (int j = 0; j < 3; ++j) {
+      out->axis[3 * k + j] += rest->along[k] * g->m[j];
+      out->m[j] += rest->along[k] * g->axis[3 * k + j];
+    }
+  }
+#if LENS == RS_LENS_AROUND
+  const fv distance = view_distance(g);
+#pragma unroll
+  for (int j = 0; j < 3; ++j) out->m[j] += rest->size * g->m[j] / (distance * distance);
+#else
+  out->m[2] += g->m[2] > 0.0f ? rest->size / g->m[2] : (fv)(0.0f);
+#endif
+}
+#endif
+
 void parameter_gradient(const ViewGaussian* g,
                         const ViewGradient* view,
                         const fv opacity,
@@ -242,10 +295,17 @@ void parameter_gradient(const ViewGaussian* g,
     const fv value = (gq[j] - g->q[j] * along) / g->q_norm;
     out->quaternion[j] = touched ? value : zero;
   }
+#if VIEW_FOOTPRINT
+  const fv thinnest = thinnest_axis(view_distance(g));
+#endif
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
+#if VIEW_FOOTPRINT
+    const iv moves = touched & (g->raw_scale[k] >= thinnest);
+#else
     const iv moves = touched & (g->raw_scale[k] >= g->scale[k]);
-    const fv value = -view->w[k] * g->w[k] * rs_scale_log_derivative(g->scale[k]);
+#endif
+    const fv value = -view->w[k] * g->w[k] * rs_scale_log_derivative(g->raw_scale[k]);
     out->scale[k] = moves ? value : zero;
   }
   // 1 - opacity has no digits left where a Gaussian is nearly opaque.

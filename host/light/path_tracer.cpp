@@ -29,8 +29,9 @@ constexpr std::size_t kWatchedBatch = std::size_t{1} << 16;  // rays between two
 // Without what belongs to a camera's view.
 TraceOptions ray_options(TraceOptions options) {
   options.background = {0, 0, 0};
-  options.sky.clear();     // the scene's environment has it
-  options.near_depth = 0;  // rays that leave a mirror have no camera that could be near
+  options.sky.clear();         // the scene's environment has it
+  options.near_depth = 0;      // rays that leave a mirror have no camera that could be near
+  options.view_footprint = 0;  // nor pixels
   return options;
 }
 

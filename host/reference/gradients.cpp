@@ -145,6 +145,11 @@ Gradient render_gradient(const Parameters& parameters,
         "the image gradient does not have 4 planes of the camera's size, pass height x width x 4 "
         "numbers");
   }
+  if (options.view_footprint > 0.0f) {
+    throw UsageError(
+        "the reference finds no gradient through a view's footprint, take differences of its "
+        "pictures");
+  }
   const auto prepared = prepare_view(parameters, options, camera);
   const glm::dmat3 to_world = glm::transpose(camera.rotation);
   const glm::dvec3 center = camera.center();

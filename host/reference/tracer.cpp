@@ -8,6 +8,8 @@
 #include <limits>
 
 #include "reference/sky.hpp"
+#include "scene/camera/pixel_spacing.hpp"
+#include "shared/layout.h"
 
 namespace raysplats::reference {
 namespace {
@@ -140,6 +142,49 @@ glm::dvec3 pixel_direction(const Camera& camera, int column, int row) {
   return {(column + 0.5 - camera.cx) / camera.fx, (row + 0.5 - camera.cy) / camera.fy, 1.0};
 }
 
+namespace {
+
+/// Raises the axes of Gaussian i to `least` and makes it as much fainter as its outline, seen from
+/// where it is `offset` away, grows: the area is that of the covariance across the direction.
+void raise_axes(const Parameters& parameters,
+                const TraceOptions& options,
+                std::size_t i,
+                double least,
+                const glm::dvec3& offset,
+                PreparedGaussian& g) {
+  const glm::dmat3 rotation =
+      rotation_matrix({parameters.quaternions[4 * i], parameters.quaternions[4 * i + 1],
+                       parameters.quaternions[4 * i + 2], parameters.quaternions[4 * i + 3]});
+  const glm::dvec3 direction = glm::normalize(offset);
+  const glm::dvec3 right = glm::normalize(glm::cross(
+      direction, std::abs(direction.x) < 0.5 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0)));
+  const glm::dvec3 up = glm::cross(direction, right);
+  const auto area = [&](const glm::dvec3& scale) {
+    double across[3] = {0, 0, 0};  // the covariance: right-right, right-up, up-up
+    for (int k = 0; k < 3; ++k) {
+      const double x = scale[k] * glm::dot(rotation[k], right);
+      const double y = scale[k] * glm::dot(rotation[k], up);
+      across[0] += x * x;
+      across[1] += x * y;
+      across[2] += y * y;
+    }
+    return std::sqrt(across[0] * across[2] - across[1] * across[1]);
+  };
+  glm::dvec3 own, raised;
+  for (int k = 0; k < 3; ++k) {
+    own[k] = activated_scale(parameters.scales[3 * i + static_cast<std::size_t>(k)],
+                             parameters.activation);
+    raised[k] = std::max(own[k], least);
+  }
+  glm::dmat3 columns = rotation;
+  for (int k = 0; k < 3; ++k) columns[k] /= raised[k];
+  g.whitening = glm::transpose(columns);
+  g.opacity *= std::pow(area(own) / area(raised), RS_FOOTPRINT_POWER);
+  g.quantile = effective_quantile(options, g.opacity);
+}
+
+}  // namespace
+
 std::vector<PreparedGaussian> prepare_view(const Parameters& parameters,
                                            const TraceOptions& options,
                                            const Camera& camera) {
@@ -147,6 +192,17 @@ std::vector<PreparedGaussian> prepare_view(const Parameters& parameters,
   if (options.near_depth > 0.0f) {
     for (PreparedGaussian& g : out) {
       g.visible = (camera.rotation * g.mean + camera.translation).z >= options.near_depth;
+    }
+  }
+  if (options.view_footprint > 0.0f && camera.model != CameraModel::kOrthographic) {
+    const bool around =
+        camera.model == CameraModel::kFisheye || camera.model == CameraModel::kEquirectangular;
+    const double pixel = static_cast<double>(options.view_footprint) * pixel_spacing(camera);
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      const glm::dvec3 offset = camera.rotation * out[i].mean + camera.translation;
+      const double least = pixel * (around ? glm::length(offset) : offset.z);
+      if (least > 0.0)
+        raise_axes(parameters, options, i, least, out[i].mean - camera.center(), out[i]);
     }
   }
   return out;

@@ -91,7 +91,7 @@ struct Render {
 glm::dvec3 pixel_direction(const Camera& camera, int column, int row);
 
 /// prepare() for one view: Gaussians nearer than near_depth along the camera's z axis are not
-/// visible.
+/// visible, and none is thinner than view_footprint.
 std::vector<PreparedGaussian> prepare_view(const Parameters& parameters,
                                            const TraceOptions& options,
                                            const Camera& camera);

@@ -134,6 +134,8 @@ std::set<std::string> read_text(const std::string& text,
   // Before there was the key.
   if (of_run && !seen.contains("borders") && !skip("borders"))
     options.data.borders = BorderUse::kKeep;
+  if (of_run && !seen.contains("view-footprint") && !skip("view-footprint"))
+    options.trace.view_footprint = 0;
   return seen;
 }
 

@@ -134,6 +134,7 @@ GaussianKernel CameraTracer::Impl::finalize_kernel(
       .define("DEPTH_GRADIENT", with_depth ? 1 : 0)
       .define("RAISE_CLAMPED", options.raise_clamped ? 1 : 0)
       .define("LENS", lens)
+      .define("VIEW_FOOTPRINT", options.view_footprint > 0 ? 1 : 0)
       .define("SH_DEGREE", gaussians.active_sh_degree)
       .define("SH_COEFFICIENTS", sh_coefficients(gaussians.sh_degree));
   const bool cpu = context.device().type == DeviceType::kCpu;

@@ -35,7 +35,7 @@ void CameraTracer::Impl::trace_ahead(const DeviceGaussians& gaussians) {
 // Lines and outlines of all Gaussians as the face sees them.
 void CameraTracer::Impl::set_face(const DeviceGaussians& gaussians, int number) {
   face = number;
-  camera = device_camera(view, options.near_depth, number);
+  camera = device_camera(view, options, number);
   lists.prepare(gaussians, camera,
                 {lens_kind, number, lens_kind != RS_LENS_PINHOLE ? &lens : nullptr}, options);
 }

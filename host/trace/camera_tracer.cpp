@@ -162,7 +162,7 @@ void CameraTracer::forward(const DeviceGaussians& gaussians,
   if (self.count != gaussians.count || self.revision != gaussians.revision) {
     throw UsageError("CameraTracer::update() must follow every change of the Gaussians");
   }
-  self.camera = device_camera(camera, self.options.near_depth);
+  self.camera = device_camera(camera, self.options);
   if (!traces(camera)) {
     throw UsageError(
         fmt::format("The camera '{}' sees too much in a tile of {} pixels for packets of rays: "

@@ -12,6 +12,7 @@
 
 #include "raysplats/error.hpp"
 #include "scene/camera/camera_check.hpp"
+#include "scene/camera/pixel_spacing.hpp"
 
 namespace raysplats {
 namespace {
@@ -54,7 +55,7 @@ int lens_kind(const Camera& camera) {
   return camera.model == CameraModel::kOpenCv ? RS_LENS_AXIAL : RS_LENS_AROUND;
 }
 
-RsCamera device_camera(const Camera& camera, float near_depth, int face) {
+RsCamera device_camera(const Camera& camera, const TraceOptions& options, int face) {
   if (camera.model == CameraModel::kOrthographic) {
     throw UsageError(fmt::format(
         "The camera '{}' is orthographic, and packets of rays are made for cameras with "
@@ -78,7 +79,9 @@ RsCamera device_camera(const Camera& camera, float near_depth, int face) {
   out.cy = static_cast<float>(camera.cy);
   out.width = camera.width;
   out.height = camera.height;
-  out.near_depth = near_depth;
+  out.near_depth = options.near_depth;
+  out.footprint =
+      static_cast<float>(static_cast<double>(options.view_footprint) * pixel_spacing(camera));
   check_camera(camera, out);
   return out;
 }
@@ -116,13 +119,15 @@ void CandidateLists::begin_programs(const DeviceGaussians& gaussians,
   const bool peak = options.hit_order == HitOrder::kPeak;
   const int coefficients = sh_coefficients(gaussians.sh_degree);
   const int variant = (sigmoid ? 1 : 0) | (peak ? 2 : 0) | (options.adaptive_radius ? 4 : 0) |
-                      gaussians.active_sh_degree << 3 | coefficients << 8 | lens << 16;
+                      gaussians.active_sh_degree << 3 | coefficients << 8 | lens << 16 |
+                      (options.view_footprint > 0 ? 1 << 18 : 0);
   if (variant == prepared_variant_) return;
   BuildOptions build;
   build.define("SIGMOID_SCALE", sigmoid ? 1 : 0)
       .define("PEAK_ORDER", peak ? 1 : 0)
       .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
       .define("LENS", lens)
+      .define("VIEW_FOOTPRINT", options.view_footprint > 0 ? 1 : 0)
       .define("SH_DEGREE", gaussians.active_sh_degree)
       .define("SH_COEFFICIENTS", coefficients);
   prepare_kernel_ = GaussianKernel(*context_, "trace/prepare_view.cl", "prepare_view", build);

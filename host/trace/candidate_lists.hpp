@@ -20,7 +20,7 @@ namespace raysplats {
 
 /// The record of a pinhole, or of one face of another central camera, that kernels read. Throws
 /// UsageError for orthographic cameras, whose rays share no origin.
-RsCamera device_camera(const Camera& camera, float near_depth, int face = 0);
+RsCamera device_camera(const Camera& camera, const TraceOptions& options, int face = 0);
 
 /// What the build constant LENS (RS_LENS_PINHOLE and others) is for a camera.
 int lens_kind(const Camera& camera);

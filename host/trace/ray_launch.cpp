@@ -20,7 +20,9 @@ constexpr std::size_t kOrderedRays = 4096;
 }  // namespace
 
 bool walks_tree(const TraceOptions& options, const DeviceInfo& device) {
-  if (options.traversal == Traversal::kAuto) return device.tuning && device.tuning->bvh;
+  // Rays have no footprint, and what a device is tuned to changes no picture.
+  if (options.traversal == Traversal::kAuto)
+    return device.tuning && device.tuning->bvh && options.view_footprint <= 0;
   return options.traversal == Traversal::kBvh;
 }
 

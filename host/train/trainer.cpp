@@ -2,6 +2,7 @@
 #include "raysplats/trainer.hpp"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <span>
@@ -73,9 +74,22 @@ DatasetOptions data_options(DatasetOptions said, const Dataset& dataset) {
   return read;
 }
 
+// Whether any view for training may be traced in packets, and not ray by ray.
+bool may_trace_packets(const TrainOptions& options, const Dataset& dataset) {
+  if (!options.mirrors.empty() || options.trace.traversal == Traversal::kBvh) return false;
+  return std::any_of(dataset.views.begin(), dataset.views.end(), [](const View& view) {
+    return !view.test && view.camera.model != CameraModel::kOrthographic;
+  });
+}
+
 TrainOptions complete_options(TrainOptions options, const Dataset& dataset) {
   check_train_options(options);
   options.data = data_options(options.data, dataset);
+  if (float& footprint = options.trace.view_footprint; !may_trace_packets(options, dataset)) {
+    if (footprint != 0 && footprint != TrainOptions().trace.view_footprint)
+      spdlog::warn("--view-footprint {:g} is left out: rays one by one have no pixel", footprint);
+    footprint = 0;  // so that the files of the run say how the model was trained
+  }
   options.iterations = run_length(options, dataset.indices(Split::kTrain).size());
   validate(options);
   return options;

@@ -15,11 +15,12 @@ enum class HitOrder {
 };
 
 /// How the rays of a camera find the Gaussians they meet. Pictures and gradients are the same
-/// within rounding.
+/// within rounding, but for TraceOptions::view_footprint.
 enum class Traversal {
-  kAuto,   ///< what the device's tuning says, else tiles; rays one by one where tiles cannot be
+  kAuto,   ///< tiles, or without a view_footprint what the device's tuning says; rays one by one
+           ///< where tiles cannot be
   kTiles,  ///< packets of rays share the candidate list of their tile of the picture
-  kBvh,    ///< every ray walks the bounding volume hierarchy (the paper)
+  kBvh,    ///< every ray walks the bounding volume hierarchy (the paper); no view_footprint
 };
 
 /// What a packet of camera rays is made of.
@@ -63,6 +64,11 @@ struct TraceOptions {
   bool adaptive_radius = false;  ///< Q shrinks where opacity * response would be below 1/255
   float near_depth =
       0.0f;  ///< Gaussians whose mean is nearer along the view axis are skipped; 0 = off
+  /// Views of cameras that packets trace show no axis of a Gaussian thinner than this share of
+  /// their pixels: thinner ones are raised to it, and the opacity falls as the area of the outline
+  /// grows (the screen filter of Yu et al. 2024, "Mip-Splatting"). Rays one by one have no pixel. 0
+  /// = off
+  float view_footprint = 0.0f;
   std::array<float, 3> background{0.0f, 0.0f, 0.0f};  ///< colour behind everything
   SkyLight sky;  ///< behind everything in views of cameras, in place of `background`; empty: none
   Traversal traversal = Traversal::kAuto;  ///< of camera rays
@@ -82,11 +88,13 @@ struct TraceOptions {
 };
 
 /// What models are trained with and shown by unless something else is said: the order of hits in
-/// which standard viewers blend, and ellipsoids no larger than what they show.
+/// which standard viewers blend, ellipsoids no larger than what they show, and nothing thinner than
+/// pixels can show.
 inline TraceOptions peak_order() {
   TraceOptions options;
   options.hit_order = HitOrder::kPeak;
   options.adaptive_radius = true;
+  options.view_footprint = 0.3f;
   return options;
 }
 

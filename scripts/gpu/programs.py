@@ -16,9 +16,9 @@ CROWDED = dict(CROWDED=1, OPEN_LOCAL=64)
 GROUP_FORWARD = dict(GROUP_CAMERA, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
 FORWARD = dict(CAMERA, BLOCK=1, PENDING=48, PEAK_ORDER=1, WITH_DEPTH=0, KEEP_HITS=0)
 # candidate_lists.cpp, gaussian_kernel.cpp.
-VIEW = dict(SIGMOID_SCALE=0, PEAK_ORDER=1, ADAPTIVE_RADIUS=1, LENS=0, SH_DEGREE=3, SH_COEFFICIENTS=16, LANES=1, GROUP=64)
+VIEW = dict(SIGMOID_SCALE=0, PEAK_ORDER=1, ADAPTIVE_RADIUS=1, LENS=0, VIEW_FOOTPRINT=1, SH_DEGREE=3, SH_COEFFICIENTS=16, LANES=1, GROUP=64)
 LISTS = dict(TILE=16, PEAK_ORDER=1, LENS=0, LANES=1, GROUP=64)
-FINALIZE = dict(SIGMOID_SCALE=0, POSE=0, ACCUMULATE=0, RAISE_CLAMPED=1, LENS=0, SH_DEGREE=3, SH_COEFFICIENTS=16, LANES=1, GROUP=64)
+FINALIZE = dict(SIGMOID_SCALE=0, POSE=0, ACCUMULATE=0, RAISE_CLAMPED=1, LENS=0, VIEW_FOOTPRINT=1, SH_DEGREE=3, SH_COEFFICIENTS=16, LANES=1, GROUP=64)
 # gradient_sums.cpp.
 ATOMIC = dict(PRIVATE_COPIES=0, EXACT_SUMS=0, FLOAT_ATOMICS=1)
 SWAP = dict(ATOMIC, FLOAT_ATOMICS=0)
@@ -70,6 +70,8 @@ PROGRAMS = [
     ("prepare sh3", "trace/prepare_view.cl", VIEW),
     ("prepare sh0", "trace/prepare_view.cl", dict(VIEW, SH_DEGREE=0, SH_COEFFICIENTS=1)),
     ("finalize group sh3", "trace/group_finalize.cl", FINALIZE),
+    ("prepare plain", "trace/prepare_view.cl", dict(VIEW, VIEW_FOOTPRINT=0)),
+    ("finalize group plain", "trace/group_finalize.cl", dict(FINALIZE, VIEW_FOOTPRINT=0)),
     ("finalize group pose", "trace/group_finalize.cl", dict(FINALIZE, POSE=1)),
     ("finalize group depth", "trace/group_finalize.cl", dict(FINALIZE, DEPTH_GRADIENT=1)),
     ("finalize group further", "trace/group_finalize.cl", dict(FINALIZE, ACCUMULATE=1)),

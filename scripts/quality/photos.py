@@ -8,8 +8,10 @@ bent      black and narrow on all sides, as another program leaves them that has
 circle    black around the largest circle, as of a fisheye
 marks     a yellow logo at the lower right, and a white box with black letters at the upper left
 enlarged  3000 pixels wide, as photos of today's cameras
+sizes     whole, a half, a quarter and an eighth as wide, in turn, as from other distances; of a data set in Blender's form,
+          whose photos are in its folder train
 
-usage: scripts/quality/photos.py bars|window|bent|circle|marks|enlarged DATA OUT        (OUT is made anew; needs numpy and Pillow)"""
+usage: scripts/quality/photos.py bars|window|bent|circle|marks|enlarged|sizes DATA OUT    (OUT is made anew; needs numpy and Pillow)"""
 import pathlib
 import shutil
 import sys
@@ -18,6 +20,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 BAR, WINDOW, BEND, EDGE, WIDTH, QUALITY = 0.12, (0.3, 0.08), 0.06, 1.02, 3000, 90
+SIZES = 1, 2, 4, 8
 
 
 def border(kind, width, height):
@@ -60,14 +63,30 @@ def change(kind, photo):
     return Image.fromarray(pixels)
 
 
+def shrink(paths):
+    """Photos in turn by the factors of SIZES; what is transparent adds nothing to the colours around it."""
+    for number, path in enumerate(paths):
+        with Image.open(path) as photo:
+            size = [max(side // SIZES[number % len(SIZES)], 1) for side in photo.size]
+            picture = photo.convert("RGBa").resize(size, Image.BOX).convert("RGBA")
+        picture.save(path)
+
+
 def main():
-    if len(sys.argv) != 4 or sys.argv[1] not in ("bars", "window", "bent", "circle", "marks", "enlarged"):
+    kinds = ("bars", "window", "bent", "circle", "marks", "enlarged", "sizes")
+    if len(sys.argv) != 4 or sys.argv[1] not in kinds:
         sys.exit(__doc__)
     source, folder = map(pathlib.Path, sys.argv[2:])
     if folder.resolve() == source.resolve():
         sys.exit("photos.py: OUT is DATA, which is not changed: name another folder")
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(source, folder)
+    if sys.argv[1] == "sizes":
+        paths = sorted(folder.glob("train/*.png"))
+        if not paths:
+            sys.exit(f"photos.py: {source} has no train/*.png, so it is no data set in Blender's form")
+        shrink(paths)
+        return
     for path in sorted(folder.glob("images/*")):
         with Image.open(path) as photo:
             picture = change(sys.argv[1], photo.convert("RGB"))

@@ -77,8 +77,8 @@ std::string header_key(std::string name) {
 }
 
 // The options of tracing that a header names.
-constexpr std::array kOptions{"hit-order", "quantile",          "adaptive-radius",
-                              "near",      "min-transmittance", "max-hits"};
+constexpr std::array kOptions{"hit-order",         "quantile", "adaptive-radius", "near",
+                              "min-transmittance", "max-hits", "view-footprint"};
 
 // False for a value that the option cannot have. Keys that are unknown, of a later version perhaps,
 // are left alone.

@@ -6,10 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <vector>
 
 #include "raysplats/error.hpp"
+#include "scene/camera/pixel_spacing.hpp"
 #include "scene/gaussians/activation.hpp"
 
 namespace raysplats {
@@ -47,7 +47,6 @@ RsFootprintView footprint_view(const Camera& camera) {
   const double sizes[2] = {static_cast<double>(camera.width), static_cast<double>(camera.height)};
   const double middles[2] = {camera.cx, camera.cy};
   const double focals[2] = {camera.fx, camera.fy};
-  double spacing = 0;
   switch (camera.model) {
     case CameraModel::kPinhole:
     case CameraModel::kOpenCv:
@@ -56,24 +55,18 @@ RsFootprintView footprint_view(const Camera& camera) {
         view.high[a] = static_cast<float>(((1 + kMargin) * sizes[a] - middles[a]) / focals[a]);
       }
       view.kind = RS_FOOTPRINT_DEPTH;
-      spacing = 1.0 / std::max(camera.fx, camera.fy);
       break;
     case CameraModel::kFisheye:
-      view.kind = RS_FOOTPRINT_DISTANCE;
-      spacing = 1.0 / std::max(camera.fx, camera.fy);
-      break;
     case CameraModel::kEquirectangular:
       view.kind = RS_FOOTPRINT_DISTANCE;
-      spacing = 2.0 * std::numbers::pi / camera.width;
       break;
     case CameraModel::kOrthographic:
       view.kind = RS_FOOTPRINT_CONSTANT;
-      spacing = 1.0 / std::max(camera.fx, camera.fy);
       break;
     case CameraModel::kPhotoLens:
       break;  // of no picture that is rendered
   }
-  view.spacing = static_cast<float>(spacing);
+  view.spacing = static_cast<float>(pixel_spacing(camera));
   return view;
 }
 

@@ -91,6 +91,7 @@ TEST_CASE("a PLY taken out of its run keeps how it is traced") {
   shown.near_depth = 1e-7f;
   shown.min_transmittance = 1.0f / 3.0f;
   shown.max_hits = 77;
+  shown.view_footprint = 0.7f;
   shown.background = {0.1f, 1.0f, 0.7f};
   shown.sky = {{0.1f, -1.0f / 3.0f, 7e-9f}, {1, 2, 3}, {4, 5, 6}, {-7, 8, 9.5f}};
   RunFolder(run).write_model(model, shown, 12);
@@ -105,6 +106,7 @@ TEST_CASE("a PLY taken out of its run keeps how it is traced") {
   CHECK(trace.near_depth == shown.near_depth);
   CHECK(trace.min_transmittance == shown.min_transmittance);
   CHECK(trace.max_hits == shown.max_hits);
+  CHECK(trace.view_footprint == shown.view_footprint);
   CHECK(trace.background == shown.background);
   CHECK(trace.sky == shown.sky);
   CHECK(read_ply(moved).size() == 1);

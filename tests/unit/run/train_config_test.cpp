@@ -465,13 +465,19 @@ TEST_CASE("a resumed run keeps its options below those of a file and of the comm
   // A run that is older than a key goes on without what that would change.
   CHECK(resumed(folder / "run").alpha_weight == TrainOptions().alpha_weight);
   std::string older = to_toml(of_run);
-  const std::size_t begin = older.find("alpha-weight");
-  REQUIRE(begin != std::string::npos);
-  older.erase(begin, older.find('\n', begin) + 1 - begin);
+  for (const char* key : {"alpha-weight", "view-footprint"}) {
+    const std::size_t begin = older.find(key);
+    REQUIRE(begin != std::string::npos);
+    older.erase(begin, older.find('\n', begin) + 1 - begin);
+  }
   std::filesystem::create_directories(folder / "older");
   folder.write("older/config.toml", older);
   CHECK(resumed(folder / "older").alpha_weight == 0);
   CHECK(resumed(folder / "older", {"--alpha-weight", "0.5"}).alpha_weight == 0.5);
+  CHECK(resumed(folder / "older").trace.view_footprint == 0);
+  TrainOptions shown;
+  read_train_config(folder / "older/config.toml", shown);
+  CHECK(shown.trace.view_footprint == 0);
   CHECK_THROWS_AS(resumed(folder / "run", {"--validate-views", "0", "--patience", "2"}),
                   UsageError);
 }

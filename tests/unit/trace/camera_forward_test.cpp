@@ -429,7 +429,7 @@ TEST_CASE("lists that 32 bits cannot count are refused before anything is writte
   const TraceOptions options;
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
   const Buffer<RsAabb> boxes(context, kCount, "boxes");
-  const RsCamera converted = device_camera(camera, 0.0f);
+  const RsCamera converted = device_camera(camera, TraceOptions{});
   CandidateLists lists(context, 1);
   lists.prepare(gaussians, converted, {}, options);
   Buffer<std::uint32_t> counters(context, RS_COUNT_WORDS, "counters");
@@ -463,7 +463,7 @@ TEST_CASE("lists with all the room that the largest buffer gives fit it, padding
   camera.fx = camera.fy = 200.0;
   const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
   const Buffer<RsAabb> boxes(context, kCount, "boxes");
-  const RsCamera converted = device_camera(camera, 0.0f);
+  const RsCamera converted = device_camera(camera, TraceOptions{});
   CandidateLists lists(context, 1);
   lists.prepare(gaussians, converted, {}, TraceOptions{});
   Buffer<std::uint32_t> counters(context, RS_COUNT_WORDS, "counters");

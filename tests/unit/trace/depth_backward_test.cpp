@@ -173,3 +173,15 @@ TEST_CASE("the gradient of depth along the rays of a fisheye equals finite diffe
   camera.model = CameraModel::kFisheye;
   check_against_differences(reference::random_scene(20, 21, 0), {}, camera);
 }
+
+TEST_CASE(
+    "the gradient of depth through a view's footprint, from within the Gaussians too [small]") {
+  TraceOptions options;
+  options.hit_order = HitOrder::kPeak;
+  options.view_footprint = 0.5f;
+  Gaussians model = reference::random_scene(30, 21, 1);
+  for (std::size_t i = 0; i < model.log_scales.size(); i += 2) model.log_scales[i] -= 2.5f;
+  check_against_differences(model, options, reference::cube_camera(7, 6));
+  const Camera within = look_at({0.1, -0.2, 0.15}, {1, 0.3, 0.5}, {0, 1, 0}, 9, 8, 7);
+  check_against_differences(model, options, within);
+}

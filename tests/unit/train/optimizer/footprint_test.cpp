@@ -7,10 +7,12 @@
 #include <filesystem>
 #include <limits>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "raysplats/dataset.hpp"
 #include "raysplats/device.hpp"
+#include "raysplats/io.hpp"
 #include "raysplats/trainer.hpp"
 #include "run/checkpoint.hpp"
 #include "scene/camera/camera_model.hpp"
@@ -31,6 +33,25 @@ std::vector<Camera> cameras_of(CameraModel model) {
     out.back().model = model;
   }
   return out;
+}
+
+// Each pixel is the mean of a block of so many pixels a side.
+Image shrunk(const Image& photo, int side) {
+  Image out(photo.width / side, photo.height / side, photo.channels);
+  for (int y = 0; y < out.height * side; ++y) {
+    for (int x = 0; x < out.width * side; ++x) {
+      for (int c = 0; c < photo.channels; ++c)
+        out.at(x / side, y / side, c) += photo.at(x, y, c) / static_cast<float>(side * side);
+    }
+  }
+  return out;
+}
+
+Camera shrunk(Camera camera, int side) {
+  camera.width /= side;
+  camera.height /= side;
+  for (double* value : {&camera.fx, &camera.fy, &camera.cx, &camera.cy}) *value /= side;
+  return camera;
 }
 
 // Size of a pixel at the point in the camera that resolves it best, in double precision; infinite
@@ -152,6 +173,34 @@ TEST_CASE("a run finds the least sizes anew where density control has ended") {
     CHECK(lows != before);
     before = lows;
   }
+}
+
+TEST_CASE("photos of several sizes learn one model that all of them show") {
+  const TemporaryDirectory folder;
+  make_photos(folder / "data", 64, 32, 6);
+  std::filesystem::create_directories(folder / "photos");
+  Context context(test_device());
+  Dataset dataset = load_dataset(folder / "data");
+  // Three of four photos for training, and half of the others, at an eighth of the size, as from
+  // farther away.
+  int number = 0, held_out = 0;
+  for (View& view : dataset.views) {
+    const bool small = view.test ? held_out++ % 2 == 0 : number % 4 != 0;
+    const Image photo = load_view_image(view);
+    view.image_path = folder / "photos" / (std::to_string(number++) + ".png");
+    write_image(view.image_path, small ? shrunk(photo, 8) : photo);
+    if (small) view.camera = view.source_camera = shrunk(view.camera, 8);
+  }
+  const auto psnr = [&](float footprint) {
+    TrainOptions options = short_training(500);
+    options.trace.view_footprint = footprint;
+    options.resolution_schedule.clear();
+    std::filesystem::remove_all(folder / "run");
+    return Trainer(context, dataset, options, folder / "run").run(false).evaluations.back().psnr;
+  };
+  const double with = psnr(TrainOptions().trace.view_footprint), without = psnr(0);
+  MESSAGE("with the footprint of views ", with, " dB, without ", without);
+  CHECK(with > without + 1.5);
 }
 
 TEST_CASE("scales keep to fixed limits, with a footprint and without [small] [tiny]") {
