@@ -199,10 +199,24 @@ def test_rasterization_has_depths_and_harmonics():
         assert torch.allclose(per_view, both[..., :3], atol=1e-5)
 
 
+def test_rasterization_antialiased_shows_nothing_thinner_than_pixels(context):
+    scene = gsplat_scene(views=1)
+    scene["scales"] = torch.full_like(scene["scales"], 0.02)  # a tenth of a pixel
+    classic = rt.rasterization(**scene)[1]
+    scene["scales"].requires_grad_()
+    alphas = rt.rasterization(**scene, rasterize_mode="antialiased")[1]
+    assert torch.count_nonzero(alphas > 1 / 255) > torch.count_nonzero(classic > 1 / 255)
+    options = rs.TraceOptions.peak_order()
+    assert options.view_footprint > 0
+    assert torch.equal(rt.rasterization(**scene, options=options)[1], alphas)
+    alphas.sum().backward()
+    assert scene["scales"].grad.abs().max() > 0
+
+
 # What is not supported: every argument of gsplat's is used, or refused by its name.
 REFUSED = {
     "far_plane": 10.0, "radius_clip": 1.0, "eps2d": 0.3, "packed": True, "tile_size": 16, "sparse_grad": True,
-    "absgrad": True, "rasterize_mode": "antialiased", "channel_chunk": 32, "distributed": True,
+    "absgrad": True, "channel_chunk": 32, "distributed": True,
     "camera_model": "ftheta", "segmented": True, "covars": torch.zeros(7, 3, 3), "with_ut": True,
     "with_eval3d": True, "radial_coeffs": torch.zeros(1, 4), "tangential_coeffs": torch.zeros(1, 2),
     "thin_prism_coeffs": torch.zeros(1, 4), "ftheta_coeffs": 1, "rolling_shutter": 1,

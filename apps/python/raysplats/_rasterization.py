@@ -74,12 +74,16 @@ def _require_numbers(named):
             raise rs.DataError(f"{name} has the number {tensor[~good][0].item():g}, but all have to be {needed}")
 
 
-def _renderer(options, near_plane, depth):
+def _renderer(options, near_plane, depth, antialiased):
     """The renderer of these options, which later calls find again while it is among the last used; all share a
     context."""
     from .torch import Renderer
 
     chosen = rs.TraceOptions.peak_order() if options is None else copy.copy(options)
+    if antialiased:
+        chosen.view_footprint = chosen.view_footprint or rs.TraceOptions.peak_order().view_footprint
+    elif options is None:
+        chosen.view_footprint = 0
     chosen.near_depth, chosen.depth = near_plane, depth
     chosen.background, chosen.sky = (0, 0, 0), ()  # those of the call count
     key = str(chosen.__getstate__())
@@ -264,7 +268,7 @@ def rasterization(
     if radius_clip != 0:
         _refuse("radius_clip", "every Gaussian that a ray meets counts")
     if eps2d != 0:
-        _refuse("eps2d", "nothing is projected, so nothing is widened; give scales a least value")
+        _refuse("eps2d", "nothing is projected; rasterize_mode='antialiased' shows nothing thinner than pixels")
     if packed:
         _refuse("packed=True", "there are no intermediate results to pack; leave it False")
     if tile_size is not None:
@@ -275,8 +279,8 @@ def rasterization(
         _refuse("sparse_grad", "gradients are dense")
     if absgrad:
         _refuse("absgrad", "there are no projected means")
-    if rasterize_mode != "classic":
-        _refuse(f"rasterize_mode='{rasterize_mode}'", "opacities are not compensated")
+    if rasterize_mode not in ("classic", "antialiased"):
+        raise rs.UsageError(f"rasterize_mode is classic or antialiased, not '{rasterize_mode}'")
     if distributed:
         _refuse("distributed", "all Gaussians are on one device")
     if segmented:
@@ -312,7 +316,7 @@ def rasterization(
         radial = None if radial_coeffs is None else radial_coeffs[i]
         cameras.append(_camera(i, Ks[i], width, height, camera_model, radial))
 
-    renderer = _renderer(options, near_plane, needs_depth)
+    renderer = _renderer(options, near_plane, needs_depth, rasterize_mode == "antialiased")
     shared = (means.contiguous(), quats.contiguous(), _log_scales(scales), _logits(opacities))
     lift = _lift(colors, sh_degree)
     pictures, alphas = [], []

@@ -58,7 +58,7 @@ void bind_trace_options(nb::module_& module) {
           nb::arg("path"), "The options in the header of a PLY that raysplats wrote, else None.")
       .def_static("peak_order", &peak_order,
                   "What models of other programs are shown by: the order of hits of rasterisers, "
-                  "and ellipsoids no larger than what they show.")
+                  "ellipsoids no larger than what they show, and nothing thinner than pixels.")
       .def_rw("quantile", &TraceOptions::quantile,
               "A ray meets a Gaussian when the squared whitened distance is at most this.")
       .def_rw("min_transmittance", &TraceOptions::min_transmittance, "A ray stops below this.")
@@ -67,6 +67,9 @@ void bind_trace_options(nb::module_& module) {
               "The quantile shrinks where opacity times response would be below 1/255.")
       .def_rw("near_depth", &TraceOptions::near_depth,
               "Gaussians nearer along the viewing axis are skipped; 0 = off.")
+      .def_rw("view_footprint", &TraceOptions::view_footprint,
+              "Views of cameras show nothing thinner than this share of a pixel, and what is "
+              "thinner fainter; 0 = off.")
       .def_rw("background", &TraceOptions::background, "Colour behind everything.")
       .def_prop_rw(
           "sky", [](const TraceOptions& o) { return tuple_of(o.sky); },
