@@ -31,14 +31,10 @@ Json describe(const ModelSummary& model) {
 }
 
 Json describe(const TraceOptions& trace) {
-  return {{"hit_order", hit_order_name(trace.hit_order)},
-          {"quantile", trace.quantile},
-          {"adaptive_radius", trace.adaptive_radius},
-          {"near_depth", trace.near_depth},
-          {"min_transmittance", trace.min_transmittance},
-          {"max_hits", trace.max_hits},
-          {"view_footprint", trace.view_footprint},
-          {"background", trace.background}};
+  return {{"hit_order", hit_order_name(trace.hit_order)}, {"quantile", trace.quantile},
+          {"adaptive_radius", trace.adaptive_radius},     {"near_depth", trace.near_depth},
+          {"min_transmittance", trace.min_transmittance}, {"max_hits", trace.max_hits},
+          {"view_footprint", trace.view_footprint},       {"background", trace.background}};
 }
 
 void print(const ModelSummary& model) {

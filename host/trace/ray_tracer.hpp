@@ -19,7 +19,8 @@
 namespace raysplats {
 
 /// Traces arbitrary rays: any origins and directions, without coherence. The order of hits is exact
-/// per ray; near_depth, view_footprint and depth of the options have no meaning here, but see set_near().
+/// per ray; near_depth, view_footprint and depth of the options have no meaning here, but see
+/// set_near().
 class RayTracer {
  public:
   RayTracer(Context& context, const TraceOptions& options);
