@@ -284,6 +284,7 @@ def wrong_arguments():
     yield {"sh_degree": 5}, "sh_degree is 0 to 4, not 5"
     yield {"sh_degree": 1}, "colors has the shape (7, 3), but (7, K, 3) is needed"
     yield {"sh_degree": 2, "colors": torch.zeros(7, 4, 3)}, "colors has 4 coefficients, but sh_degree 2 needs 9"
+    yield {"rasterize_mode": "sharp"}, "rasterize_mode is classic or antialiased, not 'sharp'"
     fisheye = {"camera_model": "fisheye"}
     yield {**fisheye, "radial_coeffs": np.zeros((1, 4))}, "radial_coeffs has to be a tensor, not ndarray"
     yield {**fisheye, "radial_coeffs": torch.full((1, 4), nan)}, "radial_coeffs[0] has numbers that are not finite"
@@ -312,7 +313,7 @@ def test_rasterization_takes_tensors_as_they_come():
 
 def test_rasterization_knows_every_argument():
     used = {"means", "quats", "scales", "opacities", "colors", "viewmats", "Ks", "width", "height", "near_plane",
-            "sh_degree", "backgrounds", "render_mode", "options"}
+            "sh_degree", "backgrounds", "render_mode", "rasterize_mode", "options"}
     assert set(inspect.signature(rt.rasterization).parameters) == used | set(REFUSED)
 
 
