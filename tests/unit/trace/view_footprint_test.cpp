@@ -129,7 +129,7 @@ reference::Parameters differences(reference::Parameters parameters,
 
 }  // namespace
 
-TEST_CASE("a view's footprint shows the picture of the double reference [tiny]") {
+TEST_CASE("a view's footprint shows the picture of the double reference") {
   SmallTiles tiles;
   Context& context = tiles.context;
   const Gaussians model = thin_scene(14);
@@ -153,7 +153,7 @@ TEST_CASE("a view's footprint shows the picture of the double reference [tiny]")
   }
 }
 
-TEST_CASE("gradients through a view's footprint are differences of the reference [tiny]") {
+TEST_CASE("gradients through a view's footprint are differences of the reference") {
   SmallTiles tiles;
   Context& context = tiles.context;
   const Gaussians model = thin_scene(14);
@@ -175,7 +175,25 @@ TEST_CASE("gradients through a view's footprint are differences of the reference
   }
 }
 
-TEST_CASE("the gradient of a pose through a view's footprint [tiny]") {
+TEST_CASE("gradients of a few pixels through a view's footprint [tiny]") {
+  SmallTiles tiles;
+  const Gaussians model = thin_scene(6);
+  View view = views().front();
+  view.camera.width = view.camera.height = 8;
+  view.camera.cx = view.camera.cy = 4;
+  const TraceOptions options = options_with(0.5f);
+  const std::vector<float> gradient = random_image_gradient(pixel_count(view.camera), 7);
+  const DeviceGaussians gaussians =
+      DeviceGaussians::upload(tiles.context, model, ScaleActivation::kExp);
+  CameraTracer tracer(tiles.context, options);
+  tracer.update(gaussians);
+  tracer.forward(gaussians, view.camera, true);
+  CHECK_ERRORS(errors_of(backward(tiles.context, tracer, gaussians, gradient),
+                         differences(reference::Parameters(model), options, view.camera, gradient)),
+               1e-3);
+}
+
+TEST_CASE("the gradient of a pose through a view's footprint") {
   constexpr double kStep = 1e-5;
   SmallTiles tiles;
   Context& context = tiles.context;
