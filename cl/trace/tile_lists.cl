@@ -132,16 +132,12 @@ float4 tile_box(const RsCamera* camera, const int tile_x, const int tile_y) {
 
 // Whether the planes of a tile's frustum keep the box out; it may still be outside when not.
 bool box_outside(const RsCamera* camera, const float4 tile, __global const RsAabb* box) {
-  float beyond = 0.0f;
-  for (int j = 0; j < 3 && camera->footprint > 0.0f; ++j) {
-    beyond += RS_FOOTPRINT_REACH * camera->footprint *
-              fmax(fabs(box->lo[j] - camera->center[j]), fabs(box->hi[j] - camera->center[j]));
-  }
   // Inward normals in camera axes: left, right, top, bottom, front.
   const float n[5][3] = {
       {1, 0, -tile.x}, {-1, 0, tile.z}, {0, 1, -tile.y}, {0, -1, tile.w}, {0, 0, 1}};
   for (int p = 0; p < 5; ++p) {
     float most = 0.0f, scale = 0.0f;  // distance of the box's farthest corner along the normal
+    float far = 0.0f;                 // of its corner that is farthest from the camera, or more
     for (int j = 0; j < 3; ++j) {
       const float normal = camera->rotation[j] * n[p][0] + camera->rotation[3 + j] * n[p][1] +
                            camera->rotation[6 + j] * n[p][2];
@@ -149,9 +145,11 @@ bool box_outside(const RsCamera* camera, const float4 tile, __global const RsAab
       const float hi = normal * (box->hi[j] - camera->center[j]);
       most += fmax(lo, hi);
       scale += fabs(lo) + fabs(hi);
+      far += fmax(fabs(box->lo[j] - camera->center[j]), fabs(box->hi[j] - camera->center[j]));
     }
     const float length = fabs(n[p][0]) + fabs(n[p][1]) + fabs(n[p][2]);
-    if (most < -1e-5f * scale - beyond * length) return true;
+    const float beyond = RS_FOOTPRINT_REACH * camera->footprint * far * length;
+    if (most < -1e-5f * scale - beyond) return true;
   }
   return false;
 }
