@@ -97,6 +97,7 @@ Command add_trace_command(CLI::App& app) {
       ->capture_default_str();
   add_overwrite_flag(*command, options->overwrite, kOverwriteFile);
   add_trace_flags(*command, options->trace);
+  command->remove_option(command->get_option("--view-footprint"));  // rays have no pixel
   add_device_flags(*command, options->device);
   return {command, [options] { run(*options); }};
 }

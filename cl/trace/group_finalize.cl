@@ -100,11 +100,10 @@ void park(__local float* row, const ViewGaussian* g, const float* mean) {
   for (int j = 0; j < 3; ++j) {
     row[j] = mean[j];
     row[3 + j] = g->raw_scale[j];
-    row[6 + j] = g->scale[j];
   }
-  for (int j = 0; j < 4; ++j) row[9 + j] = g->q[j];
-  row[13] = g->q_norm;
-  row[14] = g->logit;
+  for (int j = 0; j < 4; ++j) row[6 + j] = g->q[j];
+  row[10] = g->q_norm;
+  row[11] = g->logit;
   barrier(CLK_LOCAL_MEM_FENCE);
 }
 
@@ -113,17 +112,23 @@ void unpark(const __local float* row, ViewGaussian* g, float* mean) {
   for (int j = 0; j < 3; ++j) {
     mean[j] = row[j];
     g->raw_scale[j] = row[3 + j];
-    g->scale[j] = row[6 + j];
   }
-  for (int j = 0; j < 4; ++j) g->q[j] = row[9 + j];
-  g->q_norm = row[13];
-  g->logit = row[14];
+  for (int j = 0; j < 4; ++j) g->q[j] = row[6 + j];
+  g->q_norm = row[10];
+  g->logit = row[11];
 #if !VIEW_FOOTPRINT
   g->opacity = rs_sigmoid(g->logit);
 #endif
 }
 
-RS_WAVE_OF_16 __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
+// With the pose's gradient 16 lanes would spill.
+#if POSE
+#define RS_FINALIZE_WAVE
+#else
+#define RS_FINALIZE_WAVE RS_WAVE_OF_16
+#endif
+
+RS_FINALIZE_WAVE __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void finalize_group(
     RS_FINALIZE_ARGUMENTS) {
 #if !POSE
   (void)pose;
@@ -214,7 +219,7 @@ RS_WAVE_OF_16 __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel void f
 #if VIEW_FOOTPRINT
   barrier(CLK_LOCAL_MEM_FENCE);  // as in park()
   for (int j = 0; j < 3; ++j) g.raw_scale[j] = row[3 + j];
-  g.logit = row[14];
+  g.opacity = rs_sigmoid(row[11]);
   FootprintGradient rest;
   axis_footprint_gradient(&g, v[12], &view, &rest);
   barrier(CLK_LOCAL_MEM_FENCE);

@@ -182,7 +182,9 @@ prepare_view(const uint begin,
   ViewGaussian g;
   const iv finite = load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
 #if VIEW_FOOTPRINT
-  dilute_opacity(&g);
+  FootprintShares shares;
+  footprint_shares(&g, &shares);
+  g.opacity *= footprint_dilution(&shares);
 #endif
   const fv Q = effective_quantile(quantile, g.opacity);
   fv szz = 0, whitened = 0;

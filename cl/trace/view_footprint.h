@@ -27,12 +27,6 @@ typedef struct {
   fv kept;       // sum of t_k (r_i r_j)^2
 } FootprintShares;
 
-// t_k
-fv footprint_share(const FootprintShares* s, const fv w, const int k) {
-  const fv q = s->along[k] * w;
-  return q * q / s->whitened;
-}
-
 // Whether axis k was raised, by more than rounding.
 iv footprint_raised(const FootprintShares* s, const int k) { return s->ratio2[k] < 0.999999f; }
 
@@ -56,22 +50,17 @@ void footprint_shares(const ViewGaussian* g, FootprintShares* out) {
   }
   out->kept = 0;
 #pragma unroll
-  for (int k = 0; k < 3; ++k)
-    out->kept += footprint_share(out, g->w[k], k) * footprint_pair(out, k);
-  out->kept = smaller(out->kept, (fv)(1.0f));
+  for (int k = 0; k < 3; ++k) {
+    const fv q = out->along[k] * g->w[k];
+    out->kept += q * q * footprint_pair(out, k);
+  }
+  out->kept = smaller(out->kept / out->whitened, (fv)(1.0f));
 }
 
 // What is left of the opacity: `kept` to half of RS_FOOTPRINT_POWER, 5/8.
 fv footprint_dilution(const FootprintShares* s) {
   const fv root = sqrt(s->kept);
   return root * sqrt(sqrt(root));
-}
-
-// Makes the opacity what is left of it.
-void dilute_opacity(ViewGaussian* g) {
-  FootprintShares s;
-  footprint_shares(g, &s);
-  g->opacity *= footprint_dilution(&s);
 }
 
 #endif

@@ -226,7 +226,7 @@ void axis_footprint_gradient(ViewGaussian* g,
                              FootprintGradient* rest) {
   FootprintShares s;
   footprint_shares(g, &s);
-  g->opacity = rs_sigmoid(g->logit) * footprint_dilution(&s);
+  g->opacity *= footprint_dilution(&s);
   const fv by_area = RS_FOOTPRINT_POWER * opacity * g->opacity;  // of the area's logarithm
   const fv inverse_kept = 1.0f / s.kept;
   const fv inverse_whitened = 1.0f / s.whitened;
@@ -295,16 +295,10 @@ void parameter_gradient(const ViewGaussian* g,
     const fv value = (gq[j] - g->q[j] * along) / g->q_norm;
     out->quaternion[j] = touched ? value : zero;
   }
-#if VIEW_FOOTPRINT
   const fv thinnest = thinnest_axis(view_distance(g));
-#endif
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
-#if VIEW_FOOTPRINT
     const iv moves = touched & (g->raw_scale[k] >= thinnest);
-#else
-    const iv moves = touched & (g->raw_scale[k] >= g->scale[k]);
-#endif
     const fv value = -view->w[k] * g->w[k] * rs_scale_log_derivative(g->raw_scale[k]);
     out->scale[k] = moves ? value : zero;
   }

@@ -34,7 +34,7 @@ const std::vector<CompiledKernel>& compiled_kernels() {
       {"sm_86", "group forward render: trace_forward_group", 55, 7952, 32, 32},
       {"sm_86", "group forward train: trace_forward_group", 56, 7960, 32, 32},
       {"sm_86", "group backward atomic: trace_backward_group", 59, 7712, 32, 32},
-      {"sm_86", "finalize group sh3: finalize_group", 72, 4096, 64, 32},
+      {"sm_86", "finalize group sh3: finalize_group", 71, 4096, 64, 32},
       {"sm_86", "loss group: group_ssim_derivatives", 58, 12064, 256, 32},
       {"sm_86", "loss group: group_gradient", 40, 13104, 256, 32},
       {"sm_86", "adam sh3: adam_step", 40, 0, 64, 32},

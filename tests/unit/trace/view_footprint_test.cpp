@@ -127,6 +127,22 @@ reference::Parameters differences(reference::Parameters parameters,
   return out;
 }
 
+void check_gradients(Context& context,
+                     const Gaussians& model,
+                     const Camera& camera,
+                     ScaleActivation activation) {
+  const TraceOptions options = options_with(0.5f);
+  const std::vector<float> gradient = random_image_gradient(pixel_count(camera), 7);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, activation);
+  CameraTracer tracer(context, options);
+  tracer.update(gaussians);
+  tracer.forward(gaussians, camera, true);
+  const reference::Parameters parameters(model, activation);
+  CHECK_ERRORS(errors_of(backward(context, tracer, gaussians, gradient),
+                         differences(parameters, options, camera, gradient)),
+               1e-3);
+}
+
 }  // namespace
 
 TEST_CASE("a view's footprint shows the picture of the double reference") {
@@ -155,42 +171,21 @@ TEST_CASE("a view's footprint shows the picture of the double reference") {
 
 TEST_CASE("gradients through a view's footprint are differences of the reference") {
   SmallTiles tiles;
-  Context& context = tiles.context;
-  const Gaussians model = thin_scene(14);
   for (const View& view : views()) {
     for (const ScaleActivation activation : {ScaleActivation::kExp, ScaleActivation::kSigmoid}) {
       CAPTURE(view.name);
       CAPTURE(static_cast<int>(activation));
-      const TraceOptions options = options_with(0.5f);
-      const std::vector<float> gradient = random_image_gradient(pixel_count(view.camera), 7);
-      const reference::Parameters parameters(model, activation);
-      const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, activation);
-      CameraTracer tracer(context, options);
-      tracer.update(gaussians);
-      tracer.forward(gaussians, view.camera, true);
-      CHECK_ERRORS(errors_of(backward(context, tracer, gaussians, gradient),
-                             differences(parameters, options, view.camera, gradient)),
-                   1e-3);
+      check_gradients(tiles.context, thin_scene(14), view.camera, activation);
     }
   }
 }
 
 TEST_CASE("gradients of a few pixels through a view's footprint [tiny]") {
   SmallTiles tiles;
-  const Gaussians model = thin_scene(6);
-  View view = views().front();
-  view.camera.width = view.camera.height = 8;
-  view.camera.cx = view.camera.cy = 4;
-  const TraceOptions options = options_with(0.5f);
-  const std::vector<float> gradient = random_image_gradient(pixel_count(view.camera), 7);
-  const DeviceGaussians gaussians =
-      DeviceGaussians::upload(tiles.context, model, ScaleActivation::kExp);
-  CameraTracer tracer(tiles.context, options);
-  tracer.update(gaussians);
-  tracer.forward(gaussians, view.camera, true);
-  CHECK_ERRORS(errors_of(backward(tiles.context, tracer, gaussians, gradient),
-                         differences(reference::Parameters(model), options, view.camera, gradient)),
-               1e-3);
+  Camera camera = views().front().camera;
+  camera.width = camera.height = 8;
+  camera.cx = camera.cy = 4;
+  check_gradients(tiles.context, thin_scene(6), camera, ScaleActivation::kExp);
 }
 
 TEST_CASE("the gradient of a pose through a view's footprint") {
