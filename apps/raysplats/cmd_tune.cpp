@@ -95,7 +95,7 @@ Command add_tune_command(CLI::App& app) {
   add_trace_flags(*command, options->trace);
   command->remove_option(command->get_option("--packet-width"));
   command->remove_option(command->get_option("--packet-shape"));
-  command->remove_option(command->get_option("--view-footprint"));  // rays have no pixel
+  command->remove_option(command->get_option("--view-footprint"));  // it tunes no picture
   add_device_flags(*command, options->device);
   command->remove_option(command->get_option("--profile"));
   return {command, [options] { run(*options); }};

@@ -110,8 +110,7 @@ std::string scene_tail(TraceOptions own, TraceOptions trace, const glm::dvec3& u
   const std::vector<OptionRow> trained = trace_option_rows(own);
   std::string rows;
   for (std::size_t i = 0; i < given.size(); ++i) {
-    // Scenes have no near limit, nor footprints.
-    if (given[i].name == "near" || given[i].name == "view-footprint") continue;
+    if (given[i].name == "near") continue;  // scenes have no near limit
     if (given[i].text() != trained[i].text())
       rows += fmt::format("{} = {}\n", given[i].name, given[i].text());
   }
@@ -226,11 +225,6 @@ void run(const Options& options) {
     if (options.trace.has("near")) {
       throw UsageError(
           "--near is for models: rays that leave a mirror have no camera that could be near");
-    }
-    if (options.trace.has("view-footprint")) {
-      throw UsageError(
-          "--view-footprint is for models: rays of scene files have no pixel, [render] samples "
-          "averages them");
     }
     view_scene(options);
   } else {

@@ -31,11 +31,6 @@ void check(const RenderFlags& flags) {
     throw UsageError(
         "--near is for models alone: rays that leave a mirror have no camera that could be near");
   }
-  if (flags.trace.has("view-footprint")) {
-    throw UsageError(
-        "--view-footprint is for models alone: rays of scene files have no pixel, --samples "
-        "averages them");
-  }
   if (flags.ellipse || flags.spiral || flags.interpolate) {
     throw UsageError(
         "--ellipse, --spiral and --interpolate are for models: give a scene file --path or "

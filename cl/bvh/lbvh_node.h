@@ -64,11 +64,20 @@ typedef union {
   float s[RS_BLOCK_LANES];
 } BlockLanes;
 
+// Whether rays are cones, for which boxes reach farther (RS_BOX_MARGIN).
+#ifndef CONES
+#define CONES 0
+#endif
+
 typedef struct {
   float3 o, d, inverse;
   float3 shift;  // o / d
   float t_min;
   int side[3];  // vector of the near slab along each axis; the far one is 3 further or 3 before
+#if CONES
+  float width, spread;  // RsCone
+  float reach;          // of a Gaussian, in standard deviations
+#endif
 } RayData;
 
 // What slabs are tested with, from the ray's origin and direction.
@@ -91,6 +100,9 @@ RS_INLINE RayData ray_data(const Ray ray) {
   out.o = sound ? ray.origin : (float3)(0.0f, 0.0f, 0.0f);
   out.d = sound ? ray.direction : (float3)(0.0f, 0.0f, 1.0f);
   out.t_min = sound ? fmax(ray.t_min, 0.0f) : INFINITY;
+#if CONES
+  out.width = out.spread = out.reach = 0.0f;
+#endif
   ray_slabs(&out);
   return out;
 }
@@ -104,6 +116,24 @@ RS_INLINE RayData ray_data(const Ray ray) {
 #define RS_SLAB(plane, axis) ((plane)*ray->inverse.axis - ray->shift.axis)
 #endif
 
+#if CONES
+// Makes a ray a cone. quantile: that of the options, which no Gaussian's exceeds.
+RS_INLINE void widen_ray(const RsCone cone, const float quantile, RayData* ray) {
+  ray->width = cone.width;
+  ray->spread = cone.spread;
+  ray->reach = sqrt(quantile);
+}
+
+// How much farther than their boxes things reach for a cone: what they grow by where the cone is
+// widest, at the corner that is farthest along the ray. That of a missing child is less than the
+// FLT_MAX by which its box ends before it begins; fmax takes none for NaN.
+#define RS_BOX_MARGIN(type, far_x, far_y, far_z)                                 \
+  (ray->reach * fmax(ray->width + ray->spread * (((far_x)-ray->o.x) * ray->d.x + \
+                                                 ((far_y)-ray->o.y) * ray->d.y + \
+                                                 ((far_z)-ray->o.z) * ray->d.z), \
+                     (type)(0.0f)))
+#endif
+
 // Children of a node whose boxes the ray crosses within [t_min, t_end], one bit each; *entry their
 // entry depths.
 RS_INLINE uint ray_meets_boxes(const RayData* ray,
@@ -111,12 +141,22 @@ RS_INLINE uint ray_meets_boxes(const RayData* ray,
                                float t_end,
                                fv* entry) {
   const int sx = ray->side[0], sy = ray->side[1], sz = ray->side[2];
-  const fv nx = RS_SLAB(node[sx], x);
-  const fv fx = RS_SLAB(node[3 - sx], x);
-  const fv ny = RS_SLAB(node[sy], y);
-  const fv fy = RS_SLAB(node[5 - sy], y);
-  const fv nz = RS_SLAB(node[sz], z);
-  const fv fz = RS_SLAB(node[7 - sz], z);
+  fv nx = RS_SLAB(node[sx], x);
+  fv fx = RS_SLAB(node[3 - sx], x);
+  fv ny = RS_SLAB(node[sy], y);
+  fv fy = RS_SLAB(node[5 - sy], y);
+  fv nz = RS_SLAB(node[sz], z);
+  fv fz = RS_SLAB(node[7 - sz], z);
+#if CONES
+  const fv margin = RS_BOX_MARGIN(fv, node[3 - sx], node[5 - sy], node[7 - sz]);
+  const float3 growth = fabs(ray->inverse);
+  nx -= margin * growth.x;
+  fx += margin * growth.x;
+  ny -= margin * growth.y;
+  fy += margin * growth.y;
+  nz -= margin * growth.z;
+  fz += margin * growth.z;
+#endif
   // Rounding must not lose a grazing box (Ize 2013).
   const fv near = max(max(nx, ny), max(nz, (fv)(ray->t_min * 0.999999f)));
   const fv far = min(min(fx, fy), min(fz, (fv)(t_end))) * 1.0000004f;

@@ -32,6 +32,17 @@ RS_INLINE void store_ray(const Ray ray, __global RsRay* rays, const size_t i) {
   ((__global float8*)rays)[i] = (float8)(ray.origin, ray.t_min, ray.direction, ray.t_max);
 }
 
+// The cone of a ray that goes on from t in another direction.
+RS_INLINE RsCone cone_behind(const RsCone cone, const float t) {
+  const RsCone next = {cone.width + cone.spread * t, cone.spread};
+  return next;
+}
+
+// What a length along a ray becomes along `axis`; along the ray itself where the axis is zero.
+RS_INLINE float depth_cosine(const float4 axis, const float3 direction) {
+  return any(axis != 0.0f) ? dot(axis.xyz, direction) : 1.0f;
+}
+
 typedef struct {
   float3 color;
   float alpha, expected_depth, median_depth;

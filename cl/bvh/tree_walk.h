@@ -62,9 +62,21 @@ RS_INLINE uint child_key(
   const float x0 = RS_SLAB(lo.x, x), x1 = RS_SLAB(hi.x, x);
   const float y0 = RS_SLAB(lo.y, y), y1 = RS_SLAB(hi.y, y);
   const float z0 = RS_SLAB(lo.z, z), z1 = RS_SLAB(hi.z, z);
-  const float nx = ray->inverse.x < 0.0f ? x1 : x0, fx = ray->inverse.x < 0.0f ? x0 : x1;
-  const float ny = ray->inverse.y < 0.0f ? y1 : y0, fy = ray->inverse.y < 0.0f ? y0 : y1;
-  const float nz = ray->inverse.z < 0.0f ? z1 : z0, fz = ray->inverse.z < 0.0f ? z0 : z1;
+  float nx = ray->inverse.x < 0.0f ? x1 : x0, fx = ray->inverse.x < 0.0f ? x0 : x1;
+  float ny = ray->inverse.y < 0.0f ? y1 : y0, fy = ray->inverse.y < 0.0f ? y0 : y1;
+  float nz = ray->inverse.z < 0.0f ? z1 : z0, fz = ray->inverse.z < 0.0f ? z0 : z1;
+#if CONES
+  const float margin =
+      RS_BOX_MARGIN(float, ray->inverse.x < 0.0f ? lo.x : hi.x, ray->inverse.y < 0.0f ? lo.y : hi.y,
+                    ray->inverse.z < 0.0f ? lo.z : hi.z);
+  const float3 growth = margin * fabs(ray->inverse);
+  nx -= growth.x;
+  fx += growth.x;
+  ny -= growth.y;
+  fy += growth.y;
+  nz -= growth.z;
+  fz += growth.z;
+#endif
   // The margin is that of ray_meets_boxes().
   const float near = fmax(fmax(nx, ny), fmax(nz, ray->t_min * 0.999999f));
   const float far = fmin(fmin(fx, fy), fmin(fz, t_end)) * 1.0000004f;

@@ -26,14 +26,18 @@ __kernel void end_at_mirrors(const uint count,
   starts[i] = met && !last_level;
 }
 
-// vertices: as for surface_point().
+// vertices: as for surface_point(). With has_cones the cones go on behind the mirror as if it were
+// not there.
 __kernel void reflect_rays(const uint count,
+                           const int has_cones,
                            __global const RsSurfaceHit* restrict hits,
                            __global const uint* restrict starts,
                            __global const float* restrict vertices,
                            __global const RsRay* restrict rays,
+                           __global const RsCone* restrict cones,
                            __global RsRay* restrict next_rays,
-                           __global RsPath* restrict next_paths) {
+                           __global RsPath* restrict next_paths,
+                           __global RsCone* restrict next_cones) {
   const uint i = get_global_id(0);
   if (i >= count || !goes_on(starts, i)) return;
   const RsSurfaceHit hit = hits[i];
@@ -46,6 +50,7 @@ __kernel void reflect_rays(const uint count,
   const Ray next = {start, direction, 0.0f, FLT_MAX};
   store_ray(next, next_rays, to);
   next_paths[to].skip = hit.triangle;
+  if (has_cones) next_cones[to] = cone_behind(cones[i], hit.t);
 }
 
 typedef struct {

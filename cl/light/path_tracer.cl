@@ -21,6 +21,7 @@
 __kernel void begin_paths(const uint count,
                           const int direct,
                           __global const RsRay* restrict rays,
+                          __global const RsCone* restrict cones,
                           __global RsPath* restrict paths) {
   const uint i = get_global_id(0);
   if (i >= count) return;
@@ -33,6 +34,8 @@ __kernel void begin_paths(const uint count,
   path.media[0] = path.media[1] = 0;
   path.splits = path.lineage = 0;
   path.direct = direct;
+  path.width = cones[i].width;
+  path.spread = cones[i].spread;
   paths[i] = path;
 }
 
@@ -100,6 +103,7 @@ __kernel void load_surfaces(const uint count,
                             __global const RsPath* restrict paths,
                             __global RsRay* restrict rays,
                             __global uint* restrict from_origin,
+                            __global RsCone* restrict cones,
                             __global RsSurface* restrict surfaces) {
   const uint i = get_global_id(0);
   if (i >= count) return;
@@ -109,6 +113,7 @@ __kernel void load_surfaces(const uint count,
   ray.t_max = paths[i].blind ? -1.0f : (hit.triangle < 0 ? FLT_MAX : hit.t);
   store_ray(ray, rays, i);
   from_origin[i] = (uint)paths[i].direct;
+  cones[i] = cone_of_path(paths + i);
   RsSurface s;
   s.t = hit.t;
   s.triangle = hit.triangle;

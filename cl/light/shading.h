@@ -11,11 +11,6 @@
 
 float3 load3(const float* p) { return (float3)(p[0], p[1], p[2]); }
 
-// What a length along a ray becomes along `axis`; along the ray itself where the axis is zero.
-float depth_cosine(const float4 axis, const float3 direction) {
-  return any(axis != 0.0f) ? dot(axis.xyz, direction) : 1.0f;
-}
-
 float max3(float3 v) { return fmax(v.x, fmax(v.y, v.z)); }
 
 float3 reflected(float3 d, float3 n) { return d - 2.0f * dot(d, n) * n; }
@@ -72,6 +67,11 @@ float3 cosine_direction(float3 n, float u, float v) {
 
 // The glass bodies that a path is in: material + 1 in 16 bits each, the innermost lowest.
 typedef ulong Media;
+
+RsCone cone_of_path(__global const RsPath* path) {
+  const RsCone cone = {path->width, path->spread};
+  return cone;
+}
 
 Media media_of(__global const RsPath* path) {
   return (Media)path->media[0] | (Media)path->media[1] << 32;

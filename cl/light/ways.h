@@ -49,6 +49,7 @@ void take_way(const Way way,
     const bool back = dot(d, normal) >= 0.0f;  // to where it came from
     next.begin = 0.0f;
     next.direct = 0;
+    next.width = cone_behind(cone_of_path(path), s->t).width;
     ray.origin = back ? start_off_surface(from, normal, d, s->offset) : from - s->offset * normal;
     ray.direction = d;
     ray.t_min = 0.0f;

@@ -72,13 +72,14 @@ typedef struct {
   rs_uint pixel;   // within the batch
   rs_float begin;  // t from which Gaussians and absorption count
   rs_float throughput[3];
-  rs_uint media[2];  // glass bodies around it: material + 1 in 16 bits each, innermost lowest
-  rs_uint splits;    // glass surfaces that did both
-  rs_uint lineage;   // tells the parts of a split path apart
-  rs_int blind;      // 1: the pixel sees nothing
-  rs_int direct;     // 1: straight from the camera's centre
+  rs_uint media[2];        // glass bodies around it: material + 1 in 16 bits each, innermost lowest
+  rs_uint splits;          // glass surfaces that did both
+  rs_uint lineage;         // tells the parts of a split path apart
+  rs_int blind;            // 1: the pixel sees nothing
+  rs_int direct;           // 1: straight from the camera's centre
+  rs_float width, spread;  // of the ray's RsCone
 } RsPath;
-RS_STATIC_ASSERT_SIZE(RsPath, 48);
+RS_STATIC_ASSERT_SIZE(RsPath, 56);
 
 // Where a path meets a surface; normals are turned to the side it comes from.
 typedef struct {

@@ -14,6 +14,14 @@ typedef struct {
 } RsRay;
 RS_STATIC_ASSERT_SIZE(RsRay, 32);
 
+// The cone of a ray whose direction has unit length (Amanatides 1984): at t it meets no Gaussian
+// thinner than width + spread t, a share of what a pixel sees there (trace/ray_cone.h).
+typedef struct {
+  rs_float width;
+  rs_float spread;
+} RsCone;
+RS_STATIC_ASSERT_SIZE(RsCone, 8);
+
 typedef struct {
   rs_float color[3];
   rs_float alpha;

@@ -15,6 +15,7 @@
   RECORD(RsAabb) FIELD(RsAabb, lo) FIELD(RsAabb, hi) \
   RECORD(RsRay) FIELD(RsRay, origin) FIELD(RsRay, t_min) FIELD(RsRay, direction) \
     FIELD(RsRay, t_max) \
+  RECORD(RsCone) FIELD(RsCone, width) FIELD(RsCone, spread) \
   RECORD(RsRayResult) FIELD(RsRayResult, color) FIELD(RsRayResult, alpha) \
     FIELD(RsRayResult, expected_depth) FIELD(RsRayResult, median_depth) FIELD(RsRayResult, hits) \
     FIELD(RsRayResult, capped) \
@@ -55,7 +56,7 @@
     FIELD(RsEnvironment, forward) FIELD(RsEnvironment, light) FIELD(RsEnvironment, padding) \
   RECORD(RsPath) FIELD(RsPath, skip) FIELD(RsPath, pixel) FIELD(RsPath, begin) \
     FIELD(RsPath, throughput) FIELD(RsPath, media) FIELD(RsPath, splits) FIELD(RsPath, lineage) \
-    FIELD(RsPath, blind) FIELD(RsPath, direct) \
+    FIELD(RsPath, blind) FIELD(RsPath, direct) FIELD(RsPath, width) FIELD(RsPath, spread) \
   RECORD(RsSurface) FIELD(RsSurface, position) FIELD(RsSurface, material) \
     FIELD(RsSurface, shading) FIELD(RsSurface, entering) FIELD(RsSurface, normal) \
     FIELD(RsSurface, triangle) FIELD(RsSurface, color) FIELD(RsSurface, t) \
@@ -85,7 +86,8 @@
   RECORD(RsRayWalk) FIELD(RsRayWalk, near) FIELD(RsRayWalk, background) \
     FIELD(RsRayWalk, quantile) FIELD(RsRayWalk, min_transmittance) FIELD(RsRayWalk, max_hits) \
     FIELD(RsRayWalk, sh_coefficients) FIELD(RsRayWalk, active_degree) \
-    FIELD(RsRayWalk, color_from_origin) FIELD(RsRayWalk, padding) \
+    FIELD(RsRayWalk, color_from_origin) FIELD(RsRayWalk, has_cones) \
+    FIELD(RsRayWalk, padding) \
   RECORD(RsRaySums) FIELD(RsRaySums, screen) FIELD(RsRaySums, gaussians) \
     FIELD(RsRaySums, limit) FIELD(RsRaySums, padding)
 // clang-format on

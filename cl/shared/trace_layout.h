@@ -47,7 +47,8 @@ typedef struct {
   rs_int sh_coefficients;
   rs_int active_degree;
   rs_int color_from_origin;  // 0: colours along the rays, 1: from their origins, 2: a flag a ray
-  rs_int padding[3];
+  rs_int has_cones;          // whether every ray has one: of builds with CONES
+  rs_int padding[2];
 } RsRayWalk;
 RS_STATIC_ASSERT_SIZE(RsRayWalk, 64);
 

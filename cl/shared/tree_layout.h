@@ -10,6 +10,10 @@
 #define RS_GAUSSIAN_VECTORS(adaptive) (15 + (adaptive))
 #define RS_GAUSSIAN_MEAN 6
 #define RS_GAUSSIAN_INDEX(adaptive) (10 + (adaptive))
+// Those that rays with cones meet: axes and scales in place of matrices.
+#define RS_CONE_VECTORS 24
+#define RS_CONE_MEAN 12
+#define RS_CONE_INDEX 17
 #define RS_TRIANGLE_VECTORS 10
 
 #endif

@@ -51,3 +51,20 @@ __kernel void camera_rays(const RsLensCamera camera,
   const Ray ray = {o, d / sqrt(dot(d, d)), 0.0f, valid ? FLT_MAX : -1.0f};
   store_ray(ray, rays, id);
 }
+
+// The cones of a camera's rays, which at a depth of 1 along `axis` (depth_cosine), or at a distance
+// of 1 where it is zero, have the width `footprint`; of parallel rays everywhere.
+__kernel void camera_cones(const uint count,
+                           const float4 axis,
+                           const float footprint,
+                           __global const RsRay* restrict rays,
+                           __global RsCone* restrict cones) {
+  const uint i = get_global_id(0);
+  if (i >= count) return;
+#if CAMERA_MODEL == RS_CAMERA_ORTHOGRAPHIC
+  const RsCone cone = {footprint, 0.0f};
+#else
+  const RsCone cone = {0.0f, footprint * depth_cosine(axis, load_ray(rays, i).direction)};
+#endif
+  cones[i] = cone;
+}

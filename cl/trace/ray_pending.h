@@ -71,9 +71,9 @@ void pending_append(
 #if !PEAK_ORDER
   pending->origin2[n] = meeting->origin2.s[lane];
 #endif
-  pending->opacity[n] = block_opacity(block, lane);
+  pending->opacity[n] = met_opacity(meeting, block, lane);
 #if ADAPTIVE_RADIUS
-  pending->half_quantile[n] = block_half_quantile(block, lane);
+  pending->half_quantile[n] = met_half_quantile(meeting, block, lane);
 #endif
   pending->slot[n] = slot;
   pending->index[n] = block_index(block, lane);

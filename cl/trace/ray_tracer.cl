@@ -64,17 +64,27 @@ RS_INLINE void blend_hits(const RayScene* scene,
 
 #include "trace/ray_walk.h"
 
+// Of every ray: the flag that is read where the launch's color_from_origin is 2, and its cone, read
+// where the launch has_cones. Cones take more registers than a wave of 16 has.
+#if CONES
+#define RS_RAY_KINDS \
+  __global const uint *restrict from_origin, __global const RsCone *restrict cones
+#define RS_RAY_WAVE
+#else
+#define RS_RAY_KINDS __global const uint* restrict from_origin
+#define RS_RAY_WAVE RS_WAVE_OF_16
+#endif
+
 // With LEADING the hits of a result are the Gaussian that leads them: of the median depth, or the
 // one that shows most where there is none.
-// from_origin: of every ray, read where the launch's color_from_origin is 2.
-RS_WAVE_OF_16 RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
-                                                     const uint rays_per_item,
-                                                     RS_TREE_ARGUMENTS,
-                                                     __global const float* restrict sh,
-                                                     const RsRayWalk walk_argument,
-                                                     RS_RAY_ARGUMENTS,
-                                                     __global const uint* restrict from_origin,
-                                                     __global RsRayResult* restrict results) {
+RS_RAY_WAVE RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
+                                                   const uint rays_per_item,
+                                                   RS_TREE_ARGUMENTS,
+                                                   __global const float* restrict sh,
+                                                   const RsRayWalk walk_argument,
+                                                   RS_RAY_ARGUMENTS,
+                                                   RS_RAY_KINDS,
+                                                   __global RsRayResult* restrict results) {
   const uint first = (uint)get_global_id(0) * rays_per_item;
   const uint last = min(first + rays_per_item, ray_count);
   const RsRayWalk walk = walk_argument;
@@ -88,6 +98,9 @@ RS_WAVE_OF_16 RS_RAY_KERNEL __kernel void trace_rays(const uint ray_count,
     const size_t id = ordered ? ray_order[position] : position;
     const Ray raw = load_ray(rays, id);
     RayData ray = ray_data(raw);
+#if CONES
+    if (walk.has_cones) widen_ray(cones[id], walk.quantile, &ray);
+#endif
     if (walk.color_from_origin == 2) scene.color_from_origin = (int)from_origin[id];
     float basis[25];
     basis_along_ray(&scene, &ray, basis);

@@ -90,11 +90,18 @@ __kernel void fill_blocks(const uint count,
       // An empty box stands for parameters with a NaN or an infinity as well.
       if (box.lo.x <= box.hi.x && isfinite(check) && norm > 0.0f && opacity > 0.0f && Q > 0.0f) {
         rotation_of(q / norm, R);
+#if CONES
+        for (int k = 0; k < 3; ++k) {
+          for (int j = 0; j < 3; ++j) v[4 * k + j] = R[3 * j + k];
+          v[4 * k + 3] = scale[k];
+        }
+#else
         whitening_triangle(R, scale, sqrt(Q), v);
-        v[6] = mean.x;
-        v[7] = mean.y;
-        v[8] = mean.z;
-        v[9] = 0.5f * Q;
+#endif
+        v[RS_BLOCK_MEAN] = mean.x;
+        v[RS_BLOCK_MEAN + 1] = mean.y;
+        v[RS_BLOCK_MEAN + 2] = mean.z;
+        v[RS_BLOCK_QUANTILE] = 0.5f * Q;
         v[RS_BLOCK_OPACITY] = opacity;
       }
       color = 0.5f + RS_SH0 * vload3(0, sh + (size_t)index * 3 * sh_coefficients);

@@ -72,12 +72,12 @@ RS_INLINE void walk_ray(
           const uint index = block_index(block, lane);
           if (key == ray->t_min && index < next_index) continue;
 #if ADAPTIVE_RADIUS
-          const float exponent = block_half_quantile(block, lane);
+          const float exponent = met_half_quantile(&meeting, block, lane);
 #else
           const float exponent = half_quantile;
 #endif
           const float alpha =
-              block_opacity(block, lane) * rs_exp((fv)(-exponent * cross2 * reciprocal)).x;
+              met_opacity(&meeting, block, lane) * rs_exp((fv)(-exponent * cross2 * reciprocal)).x;
           pending_insert(blocks, &pending, key, alpha, peak, number_of_block * LANES + lane, index);
           const bool ends = pending.remaining < scene->min_transmittance &&
                             pending_end(&pending, scene->min_transmittance, state->transmittance);
@@ -151,7 +151,7 @@ RS_INLINE void walk_ray(
           const uint lane = rs_lowest_bit(hits);
           pending_append(&pending, &meeting, block, number_of_block * LANES + lane, lane);
           prefetch_color(scene, pending.index[pending.size - 1]);
-          hopeful *= 1.0f - block_opacity(block, lane);
+          hopeful *= 1.0f - met_opacity(&meeting, block, lane);
         }
         const int room = state->room;
         if (!(hopeful < scene->min_transmittance) && pending.size <= min(room, RAY_HITS - LANES))

@@ -77,7 +77,7 @@ std::vector<NamedNumbers> results_of(Context& context,
   trace.traversal = Traversal::kTiles;
   add_step(context, model, trace, "tiles, ", out);
   trace.traversal = Traversal::kBvh;
-  add_step(context, model, trace, "tree, ", out);
+  add_step(context, model, of_bare_rays(trace), "tree, ", out);  // with gradients
   return out;
 }
 
@@ -87,22 +87,24 @@ std::set<std::string> compared_rows(const DeviceInfo& device, const TraceOptions
   const std::string shape = packet_shape_name(packet.subgroups ? PacketShape::kSubgroup
                                               : packet.grouped ? PacketShape::kGroup
                                                                : PacketShape::kVector);
-  return {"sort",
-          "bounds",
-          "order",
-          "nodes",
-          "build",
-          "prepare-view",
-          "tile-lists",
-          "forward",
-          "view",
-          "view-bvh",
-          "backward",
-          "finalize",
-          "loss-gradient",
-          "adam",
-          "forward-" + shape,
-          "backward-" + shape};
+  std::set<std::string> rows{"sort",
+                             "bounds",
+                             "order",
+                             "nodes",
+                             "build",
+                             "prepare-view",
+                             "tile-lists",
+                             "forward",
+                             "view",
+                             "view-bvh",
+                             "backward",
+                             "finalize",
+                             "loss-gradient",
+                             "adam",
+                             "forward-" + shape,
+                             "backward-" + shape};
+  if (has_cones(trace)) rows.erase("view-bvh");  // its gradients are those of bare rays
+  return rows;
 }
 
 // Each name once, in the order of the rows.

@@ -101,7 +101,7 @@ ExecutedCounts SceneBench::counts(bool grouped) {
   count_view(tracer, self.gaussians(), camera, out);
   DeviceInfo device = self.context.device();
   if (grouped) device.type = DeviceType::kGpu;
-  RayTracer rays(self.context, trace, tree_form(device));
+  RayTracer rays(self.context, of_bare_rays(trace), tree_form(device));
   rays.count_work();
   rays.update(self.gaussians());
   self.make_rays();

@@ -47,7 +47,7 @@ BenchOperation SceneBench::Impl::sort() {
 // What RayTracer needs before its first ray, of a model as commands load it (in_morton_order).
 BenchOperation SceneBench::Impl::build() {
   return {[this] {
-            if (!ray_tracer) ray_tracer = std::make_unique<RayTracer>(context, options.trace);
+            rays_tracer();
             gaussians();
           },
           {},
@@ -63,11 +63,7 @@ BenchOperation SceneBench::Impl::build() {
 }
 
 BenchOperation SceneBench::Impl::refit() {
-  return {[this] {
-            if (!ray_tracer) ray_tracer = std::make_unique<RayTracer>(context, options.trace);
-            gaussians();
-            ray_tracer->update(gaussians());
-          },
+  return {[this] { rays_tracer().update(gaussians()); },
           {},
           [this] { ray_tracer->refit(gaussians()); },
           {{"refit", {}, false, [this] { return together(bounds_work(), nodes_work()); }}}};
@@ -156,8 +152,7 @@ BenchOperation SceneBench::Impl::packets(PacketShape shape) {
 
 BenchOperation SceneBench::Impl::rays() {
   return {[this] {
-            if (!ray_tracer) ray_tracer = std::make_unique<RayTracer>(context, options.trace);
-            ray_tracer->update(gaussians());
+            rays_tracer().update(gaussians());
             make_rays();
           },
           {},

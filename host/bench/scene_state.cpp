@@ -68,6 +68,11 @@ CameraTracer& SceneBench::Impl::tracer() {
   return *camera_tracer;
 }
 
+RayTracer& SceneBench::Impl::rays_tracer() {
+  if (!ray_tracer) ray_tracer = std::make_unique<RayTracer>(context, of_bare_rays(options.trace));
+  return *ray_tracer;
+}
+
 ViewTracer& SceneBench::Impl::view_tracer() {
   if (!tree_view_tracer) {
     TraceOptions trace = options.trace;

@@ -35,7 +35,8 @@ struct SceneBench::Impl {
   DeviceGaussians& gaussians();
   const Buffer<RsAabb>& boxes();  ///< of the Gaussians
   CameraTracer& tracer();         ///< with an up-to-date tree
-  ViewTracer& view_tracer();      ///< the same of every ray's walk through the tree
+  RayTracer& rays_tracer();
+  ViewTracer& view_tracer();  ///< the same of every ray's walk through the tree
   void forward_with_hits();
   void make_loss();
   void make_gradients();

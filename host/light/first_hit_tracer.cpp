@@ -25,7 +25,11 @@ std::vector<RayResult> FirstHitTracer::trace(const DeviceGaussians& gaussians,
   context_.kernel(kProgram, "end_at_surfaces").launch(each, rays, hits_, rays_);
   const DeviceGaussians& normals = normals_.of(gaussians, camera);
   tracer_.follow(normals);
-  tracer_.trace(normals, rays_, count, results_);
+  const bool cones = has_cones(tracer_.options());
+  if (cones) {
+    camera_rays_.cones(camera, tracer_.options().view_footprint, rays_, count, cones_);
+  }
+  tracer_.trace(normals, rays_, count, results_, ColorDirection::kRay, cones ? &cones_ : nullptr);
   context_.kernel(kProgram, "add_surfaces")
       .launch(each, rays, depth_axis(camera), hits_, surfaces.vertices(), rays_, results_);
   std::vector<RayResult> out(count);

@@ -38,6 +38,7 @@ class FirstHitTracer {
   RayTracer tracer_;  // of what carries normals as colours, which stand in the tree's leaves
   CameraRays camera_rays_;
   Buffer<Ray> rays_;
+  Buffer<RsCone> cones_;
   Buffer<RsSurfaceHit> hits_;
   Buffer<RayResult> results_;
 };

@@ -18,6 +18,7 @@ MirrorPaths::MirrorPaths(Context& context, RayTracer& tracer, const Mirrors& mir
       tracer_(&tracer),
       max_bounces_(mirrors.max_bounces),
       scan_(context),
+      no_cones_(context, 1, "no cones"),
       no_hits_(context, 1, "no hits"),
       no_words_(context, 1, "no words"),
       no_materials_(context, 1, "no materials"),
@@ -65,9 +66,12 @@ std::size_t MirrorPaths::find_mirrors(std::size_t number) {
   Level& after = levels_[number + 1];
   after.rays.ensure(*context_, next, "reflected rays");
   after.paths.ensure(*context_, next, "reflected paths");
+  const bool cones = has_cones(tracer_->options());
+  if (cones) after.cones.ensure(*context_, next, "reflected cones");
   kernel("reflect_rays")
-      .launch(each, u32(level.count), level.hits, level.starts, surfaces_->vertices(), level.rays,
-              after.rays, after.paths);
+      .launch(each, u32(level.count), cones ? 1 : 0, level.hits, level.starts,
+              surfaces_->vertices(), level.rays, cones ? level.cones : no_cones_, after.rays,
+              after.paths, cones ? after.cones : no_cones_);
   return next;
 }
 
@@ -85,7 +89,8 @@ void MirrorPaths::trace(const DeviceGaussians& gaussians,
     live = has_mirrors() ? find_mirrors(used_) : 0;
     level.results.ensure(*context_, level.count, "ray results");
     tracer_->trace(gaussians, level.rays, level.count, level.results,
-                   used_ == 0 ? direction_ : ColorDirection::kRay);
+                   used_ == 0 ? direction_ : ColorDirection::kRay,
+                   has_cones(tracer_->options()) ? &level.cones : nullptr);
     ++used_;
   }
   for (std::size_t number = used_; number-- > 0;) {

@@ -27,6 +27,8 @@ class MirrorPaths {
 
   /// Rays of the batch that comes next: to be filled by the caller, their ends move to the mirrors.
   Buffer<Ray>& rays() { return levels_[0].rays; }
+  /// Their cones, to be filled as well where the tracer's options have a view_footprint.
+  Buffer<RsCone>& cones() { return levels_[0].cones; }
   /// Traces the first `count` of rays(). `direction` is that of colours before the first mirror;
   /// behind it they follow the ray. `capped`, a 64-bit count in two words
   /// (cl/parallel/counter.h), grows by the rays that stopped because of max_hits.
@@ -58,6 +60,7 @@ class MirrorPaths {
   struct Level {
     std::size_t count = 0;
     Buffer<Ray> rays;
+    Buffer<RsCone> cones;
     Buffer<RsPath> paths;
     Buffer<RsSurfaceHit> hits;
     Buffer<std::uint32_t> starts;
@@ -79,6 +82,7 @@ class MirrorPaths {
   ColorDirection direction_ = ColorDirection::kRay;
   std::array<float, 4> background_{};
   // Stand for what there is not.
+  Buffer<RsCone> no_cones_;
   Buffer<RsSurfaceHit> no_hits_;
   Buffer<std::uint32_t> no_words_;
   Buffer<RsMaterial> no_materials_;

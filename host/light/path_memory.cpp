@@ -29,9 +29,9 @@ constexpr std::size_t kMaxCpuBatch = std::size_t{1} << 17;
 
 // A path with its ray and two that may follow from it, what it meets and gathers, the order in
 // which rays are traced.
-constexpr std::size_t kPathBytes = 3 * (sizeof(Ray) + sizeof(RsPath)) + sizeof(RsSurfaceHit) +
-                                   sizeof(RsSurface) + sizeof(RayResult) + 16 * kFloat +
-                                   6 * sizeof(std::uint32_t) + RayOrder::kBytesPerRay;
+constexpr std::size_t kPathBytes = 3 * (sizeof(Ray) + sizeof(RsPath)) + sizeof(RsCone) +
+                                   sizeof(RsSurfaceHit) + sizeof(RsSurface) + sizeof(RayResult) +
+                                   16 * kFloat + 6 * sizeof(std::uint32_t) + RayOrder::kBytesPerRay;
 // A shadow ray, what it leaves out, what surfaces and Gaussians take of it.
 constexpr std::size_t kShadowBytes =
     sizeof(Ray) + sizeof(std::int32_t) + kFloat + sizeof(RayResult);

@@ -29,9 +29,8 @@ constexpr std::size_t kWatchedBatch = std::size_t{1} << 16;  // rays between two
 // Without what belongs to a camera's view.
 TraceOptions ray_options(TraceOptions options) {
   options.background = {0, 0, 0};
-  options.sky.clear();         // the scene's environment has it
-  options.near_depth = 0;      // rays that leave a mirror have no camera that could be near
-  options.view_footprint = 0;  // nor pixels
+  options.sky.clear();     // the scene's environment has it
+  options.near_depth = 0;  // rays that leave a mirror have no camera that could be near
   return options;
 }
 
@@ -149,7 +148,8 @@ std::optional<glm::dvec3> PathTracer::Impl::first_point(const Camera& camera) {
   const std::size_t middle = width * (static_cast<std::size_t>(camera.height) / 2) + width / 2;
   camera_rays.generate(camera, Lens(), middle, 1, rays);
   surfaces.triangles().nearest(rays, 1, hits);
-  tracer.trace(gaussians, rays, 1, results);
+  camera_rays.cones(camera, options.view_footprint, rays, 1, cones);
+  tracer.trace(gaussians, rays, 1, results, ColorDirection::kRay, cones_of_rays());
   const RsSurfaceHit surface = hits.read(0);
   const float cloud = results.read(0).median_depth;
   float depth = std::numeric_limits<float>::infinity();

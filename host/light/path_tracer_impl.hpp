@@ -40,6 +40,8 @@ struct PathTracer::Impl {
                     std::size_t first_sum);
   std::size_t trace_wave(const RsWave& wave, std::size_t count, std::size_t first_sum);
   bool light_on_gaussians();
+  float footprint() const;
+  const Buffer<RsCone>* cones_of_rays() const { return has_cones(options) ? &cones : nullptr; }
   bool by_packets(const Camera& camera);
   void trace_packets(const Camera& camera, const std::function<void()>& watch);
   void take_packets(const RsWave& wave, std::size_t count);
@@ -60,6 +62,7 @@ struct PathTracer::Impl {
   std::optional<CameraTracer> packets;  // once they are wanted
   std::optional<FirstHitTracer> first;
   bool packet_depth = false;
+  float packet_footprint = 0;
   std::size_t packet_pixels = 0;  // of the picture that they have traced; 0 = none
   std::array<float, 4> packet_axis{};
   std::size_t part = 0, parts = 1;  // set_share()
@@ -72,6 +75,7 @@ struct PathTracer::Impl {
   Statistics statistics;
 
   Buffer<Ray> rays, next_rays, shadow_rays;
+  Buffer<RsCone> cones;
   Buffer<RsPath> paths, next_paths;
   Buffer<RsSurfaceHit> hits;
   Buffer<RsSurface> met;

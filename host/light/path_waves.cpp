@@ -2,6 +2,7 @@
 // One sample of a batch of pixels: all its paths advance by one surface at a time.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 
 #include "device/kernel.hpp"
@@ -61,10 +62,11 @@ void PathTracer::Impl::trace_sample(const Camera& camera,
   lens.aperture = scatters() ? settings.aperture : 0.0f;
   lens.focus_distance = settings.focus_distance;
   camera_rays.generate(camera, lens, first, count, rays);
+  camera_rays.cones(camera, footprint(), rays, count, cones);
   paths.ensure(context, count, "paths");
   kernel("begin_paths")
       .launch(Range::linear(count, kGroup), u32(count),
-              camera.model == CameraModel::kOrthographic ? 0 : 1, rays, paths);
+              camera.model == CameraModel::kOrthographic ? 0 : 1, rays, cones, paths);
   RsWave wave = wave_record(sample, first);
   statistics.camera_rays += count;
   for (std::size_t live = count; live > 0; ++wave.bounce) {
@@ -80,6 +82,7 @@ std::size_t PathTracer::Impl::trace_wave(const RsWave& wave,
   hits.ensure(context, count, "surface hits");
   met.ensure(context, count, "surfaces");
   from_origin.ensure(context, count, "colour directions");
+  cones.ensure(context, count, "cones of rays");
   gaussian_light.ensure(context, count, "light on Gaussians");
   surface_light.ensure(context, count, "light on surfaces");
   gained.ensure(context, count, "light of paths");
@@ -92,11 +95,11 @@ std::size_t PathTracer::Impl::trace_wave(const RsWave& wave,
   kernel("load_surfaces")
       .launch(each, u32(count), hits, surfaces.vertices(), surfaces.triangle_materials(),
               surfaces.materials(), surfaces.textures(), surfaces.texels(), paths, rays,
-              from_origin, met);
+              from_origin, cones, met);
   if (wave.bounce == 0 && packet_pixels > 0) {
     take_packets(wave, count);
   } else {
-    tracer.trace(gaussians, rays, from_origin, count, results);
+    tracer.trace(gaussians, rays, from_origin, count, results, cones_of_rays());
   }
   gaussian_light.clear(count);
   surface_light.clear(count);
@@ -118,6 +121,11 @@ std::size_t PathTracer::Impl::trace_wave(const RsWave& wave,
   return live;
 }
 
+// Rays of several samples are as much closer to each other.
+float PathTracer::Impl::footprint() const {
+  return options.view_footprint / std::sqrt(static_cast<float>(settings.samples));
+}
+
 bool PathTracer::Impl::light_on_gaussians() {
   const ShadowSettings& shadows = settings.shadows;
   const bool wanted = (shadows.mesh_on_gaussians && surfaces.triangles().size() > 0) ||
@@ -133,10 +141,11 @@ bool PathTracer::Impl::by_packets(const Camera& camera) {
     return false;
   const bool lit = light_on_gaussians();
   if (lit && settings.shadows.gaussians_on_gaussians) return false;
-  if (!packets || packet_depth != lit) {
-    TraceOptions with_depth = options;
-    with_depth.depth = packet_depth = lit;
-    packets.emplace(context, with_depth);
+  if (!packets || packet_depth != lit || packet_footprint != footprint()) {
+    TraceOptions shown = options;
+    shown.depth = packet_depth = lit;
+    shown.view_footprint = packet_footprint = footprint();
+    packets.emplace(context, shown);
     packets->update(gaussians);
   }
   return packets->traces(camera);
@@ -159,7 +168,7 @@ void PathTracer::Impl::take_packets(const RsWave& wave, std::size_t count) {
   if (surfaces.triangles().size() > 0) {
     shadow_rays.ensure(context, count, "shadow rays");
     kernel("rays_to_surfaces").launch(each, u32(count), met, rays, shadow_rays);
-    tracer.trace(gaussians, shadow_rays, from_origin, count, results);
+    tracer.trace(gaussians, shadow_rays, from_origin, count, results, cones_of_rays());
   }
   kernel("results_of_picture")
       .launch(each, u32(count), wave.first_pixel, u32(packet_pixels), packets->image(), met,

@@ -148,7 +148,7 @@ struct Tracer::Impl {
         options(options_in),
         mirrors(!mirrors_in.meshes.empty()),
         views(context_in, options_in, std::move(mirrors_in)),
-        tracer(context_in, options_in),
+        tracer(context_in, of_bare_rays(options_in)),
         sums(context_in, tracer) {}
 
   std::size_t batch() const {

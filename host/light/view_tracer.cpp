@@ -29,7 +29,7 @@ namespace {
 constexpr std::size_t kGroup = 64;
 // A ray with its result, surface hit and gradients, and once more for a reflected one.
 constexpr std::size_t kPathBytes =
-    2 * (sizeof(Ray) + sizeof(RayResult) + sizeof(RsSurfaceHit) + sizeof(RsPath) +
+    2 * (sizeof(Ray) + sizeof(RsCone) + sizeof(RayResult) + sizeof(RsSurfaceHit) + sizeof(RsPath) +
          2 * sizeof(RayBackward::ResultGradient) + 4);
 constexpr std::size_t kLeastBatch = 4096;
 constexpr std::size_t kWatchedBatch = std::size_t{1} << 16;
@@ -118,8 +118,12 @@ struct ViewTracer::Impl {
       sky.emplace(context, light);
     }
   }
-  Rays& single_rays() {
-    if (!rays) rays.emplace(context, options, mirrors);
+  // Pictures to be differentiated are of rays that are no cones, whose gradient is known.
+  Rays& single_rays(bool keep) {
+    const bool bare = keep || !has_cones(options);
+    std::optional<Rays>& wanted = bare ? bare_rays : cones;
+    if (!wanted) wanted.emplace(context, bare ? of_bare_rays(options) : options, mirrors);
+    rays = &*wanted;
     return *rays;
   }
   std::size_t batch() const {
@@ -147,7 +151,8 @@ struct ViewTracer::Impl {
   bool tree;  // rays walk it though they could be traced by tiles
   CameraTracer packets;
   std::uint64_t packets_revision = 0;
-  std::optional<Rays> rays;  // once a view needs it
+  std::optional<Rays> bare_rays, cones;  // once a view needs them
+  Rays* rays = nullptr;                  // those that the last such view took
   std::function<void(double)> watch;
   std::size_t part = 0, parts = 1;  // of pictures
   // The last view.
@@ -170,7 +175,7 @@ ViewTracer::ViewTracer(Context& context, const TraceOptions& options, Mirrors mi
     : impl_(std::make_unique<Impl>(context, options, std::move(mirrors))) {
   if (impl_->mirrors.meshes.empty() && impl_->mirrors.max_bounces >= 0) return;
   require_no_more_than_mirrors_show(options);
-  impl_->single_rays();
+  impl_->single_rays(false);
 }
 ViewTracer::~ViewTracer() = default;
 
@@ -226,7 +231,9 @@ void ViewTracer::forward(const DeviceGaussians& gaussians,
   self.revision = gaussians.revision;
 }
 
-RayTracer* ViewTracer::ray_tracer() { return impl_->rays ? &impl_->rays->tracer : nullptr; }
+RayTracer* ViewTracer::ray_tracer() {
+  return impl_->rays != nullptr ? &impl_->rays->tracer : nullptr;
+}
 
 void ViewTracer::forward_rays(const DeviceGaussians& gaussians, const Camera& camera, bool keep) {
   Impl& self = *impl_;
@@ -236,7 +243,7 @@ void ViewTracer::forward_rays(const DeviceGaussians& gaussians, const Camera& ca
   self.by_rays = true;
   self.camera = camera;
   self.options.background = self.background;
-  self.single_rays().tracer.follow(gaussians);
+  self.single_rays(keep).tracer.follow(gaussians);
   self.forward_rays(gaussians, keep);
   self.own_image = true;
   if (self.sky) self.sky->show(camera, self.image);
@@ -251,6 +258,10 @@ void ViewTracer::Impl::trace_batch(const DeviceGaussians& gaussians,
   rays_whole = false;
   rays->tracer.set_near(RayNear::of(camera, options.near_depth));
   rays->generator.generate(camera, Lens{}, first, count, rays->paths.rays());
+  if (has_cones(rays->tracer.options())) {
+    rays->generator.cones(camera, options.view_footprint, rays->paths.rays(), count,
+                          rays->paths.cones());
+  }
   rays->paths.trace(gaussians, count, color_direction(camera), options.background, counter);
   rays_whole = count == pixel_count(camera);
 }

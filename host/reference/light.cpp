@@ -42,6 +42,7 @@ struct State {
   double t_start = 0.0;
   int skip = -1;        ///< triangle that the ray starts at
   bool direct = false;  ///< straight from a camera's centre
+  Cone cone;
   glm::dvec3 throughput{1.0};
   double probability = 1.0;
   int surfaces = 0;
@@ -93,9 +94,9 @@ std::size_t leading(const RayTrace& ray, double& margin) {
 /// Adds T s C to the result; returns what the ray met.
 RayTrace Walk::gaussians(const State& state, double t_end, double& margin) {
   const double t_min = state.t_start > 0.0 ? std::nextafter(state.t_start, kInfinity) : 0.0;
-  RayTrace ray =
-      trace_ray(scene_.parameters, scene_.prepared, scene_.options, state.origin, state.direction,
-                t_min, t_end, state.direct ? ColorMode::kFromOrigin : ColorMode::kAlongRay);
+  RayTrace ray = trace_ray(
+      scene_.parameters, scene_.prepared, scene_.options, state.origin, state.direction, t_min,
+      t_end, state.direct ? ColorMode::kFromOrigin : ColorMode::kAlongRay, state.cone);
   margin = std::min(margin, ray.margin);
   if (ray.hits.empty()) return ray;
   const double depth = std::min(ray.alpha > 0.5 ? ray.median_depth : ray.expected_depth, t_end);
@@ -171,6 +172,7 @@ void Walk::go(State state) {
       next.origin = point.position;
       next.t_start = 0.0;
       next.direct = false;
+      next.cone.width += next.cone.spread * hit.t;
       next.direction = reflected(state.direction, point.shading_normal);
       const double above = glm::dot(next.direction, point.geometric_normal);
       margin = std::min(margin, std::abs(above));
@@ -255,6 +257,7 @@ void Walk::glass(const State& state,
   next.origin = point.position;
   next.t_start = 0.0;
   next.direct = false;
+  next.cone.width += next.cone.spread * t;
   note(state, margin);
   State reflection = next;
   reflection.direction = reflected(d, n);
@@ -300,13 +303,15 @@ LightScene::LightScene(const Scene& source)
 LightPath trace_light(const LightScene& scene,
                       const glm::dvec3& origin,
                       const glm::dvec3& direction,
-                      bool from_center) {
+                      bool from_center,
+                      const Cone& cone) {
   LightPath path;
   path.alpha = 1.0;
   State state;
   state.origin = origin;
   state.direction = glm::normalize(direction);
   state.direct = from_center;
+  state.cone = cone;
   Walk(scene, path).go(state);
   return path;
 }
@@ -329,8 +334,9 @@ LightRender render_light(const Scene& source, const Camera& camera) {
   for (int row = 0; row < camera.height; ++row) {
     for (int column = 0; column < camera.width; ++column) {
       const std::size_t pixel = out.margin.size();
-      const LightPath path = trace_light(scene, camera.center(),
-                                         to_world * pixel_direction(camera, column, row), true);
+      const glm::dvec3 direction = glm::normalize(to_world * pixel_direction(camera, column, row));
+      const LightPath path = trace_light(scene, camera.center(), direction, true,
+                                         pixel_cone(camera, scene.options, direction));
       for (int c = 0; c < 3; ++c) {
         out.image[static_cast<std::size_t>(c) * pixels + pixel] = path.color[c];
       }

@@ -52,12 +52,14 @@ struct LightPath {
 
 /// The light along one ray after docs/light.md, by recursion over brute force. `direction` is
 /// normalised first. Mirrors are smooth whatever their roughness, sphere lights are integrated over
-/// 256 points of their disc instead of sampled. `from_center`: the ray leaves a camera's centre.
+/// 256 points of their disc instead of sampled. `from_center`: the ray leaves a camera's centre;
+/// `cone`: of the ray.
 /// Throws UsageError for indirect light.
 LightPath trace_light(const LightScene& scene,
                       const glm::dvec3& origin,
                       const glm::dvec3& direction,
-                      bool from_center = false);
+                      bool from_center = false,
+                      const Cone& cone = {});
 LightPath trace_light(const Scene& scene, const glm::dvec3& origin, const glm::dvec3& direction);
 
 /// The share of a light's colour that reaches a point past triangles and Gaussians (V before

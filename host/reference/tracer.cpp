@@ -63,87 +63,6 @@ glm::dvec3 color_direction(ColorMode mode,
   return length > 0.0 ? v / length : glm::normalize(direction);
 }
 
-}  // namespace
-
-std::vector<PreparedGaussian> prepare(const Parameters& parameters, const TraceOptions& options) {
-  std::vector<PreparedGaussian> out(parameters.size());
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    out[i].mean = parameters.mean(i);
-    out[i].whitening = whitening_matrix(parameters, i);
-    out[i].opacity = sigmoid(parameters.opacities[i]);
-    out[i].quantile = effective_quantile(options, out[i].opacity);
-  }
-  return out;
-}
-
-RayTrace trace_ray(const Parameters& parameters,
-                   const TraceOptions& options,
-                   const glm::dvec3& origin,
-                   const glm::dvec3& direction,
-                   double t_min,
-                   double t_max,
-                   ColorMode color_mode) {
-  return trace_ray(parameters, prepare(parameters, options), options, origin, direction, t_min,
-                   t_max, color_mode);
-}
-
-RayTrace trace_ray(const Parameters& parameters,
-                   const std::vector<PreparedGaussian>& prepared,
-                   const TraceOptions& options,
-                   const glm::dvec3& origin,
-                   const glm::dvec3& direction,
-                   double t_min,
-                   double t_max,
-                   ColorMode color_mode) {
-  RayTrace out;
-  std::vector<Hit> all;
-  for (std::size_t i = 0; i < prepared.size(); ++i) {
-    Hit hit;
-    hit.index = static_cast<std::uint32_t>(i);
-    if (intersect(prepared[i], options, origin, direction, t_min, t_max, hit, out.margin))
-      all.push_back(hit);
-  }
-  std::sort(all.begin(), all.end(),
-            [](const Hit& a, const Hit& b) { return a.t != b.t ? a.t < b.t : a.index < b.index; });
-
-  const double stop = options.min_transmittance;
-  const auto max_hits = static_cast<std::size_t>(std::max(options.max_hits, 0));
-  double depth_sum = 0.0;
-  double weight_sum = 0.0;
-  double& transmittance = out.transmittance;
-  for (std::size_t n = 0; n < all.size(); ++n) {
-    if (n > 0) lower(out.margin, all[n].t - all[n - 1].t, all[n].t);
-    if (transmittance < stop) break;
-    if (n == max_hits) {
-      out.capped = true;
-      break;
-    }
-    Hit& hit = all[n];
-    const std::size_t i = hit.index;
-    hit.transmittance = transmittance;
-    hit.color =
-        color(parameters, i, color_direction(color_mode, prepared[i].mean, origin, direction));
-    const double weight = transmittance * hit.alpha;
-    out.color += weight * hit.color;
-    depth_sum += weight * hit.t_peak;
-    weight_sum += weight;
-    transmittance *= 1.0 - hit.alpha;
-    if (hit.transmittance >= 0.5 && transmittance < 0.5) out.median_depth = hit.t_peak;
-    lower(out.margin, transmittance - stop, stop);
-    out.hits.push_back(hit);
-  }
-  out.color += transmittance * light_behind(options, direction);
-  out.alpha = 1.0 - transmittance;
-  if (weight_sum > 0.0) out.expected_depth = depth_sum / weight_sum;
-  return out;
-}
-
-glm::dvec3 pixel_direction(const Camera& camera, int column, int row) {
-  return {(column + 0.5 - camera.cx) / camera.fx, (row + 0.5 - camera.cy) / camera.fy, 1.0};
-}
-
-namespace {
-
 /// Raises the axes of Gaussian i to `least` and makes it as much fainter as its outline, seen from
 /// where it is `offset` away, grows: the area is that of the covariance across the direction.
 void raise_axes(const Parameters& parameters,
@@ -184,6 +103,99 @@ void raise_axes(const Parameters& parameters,
 }
 
 }  // namespace
+
+std::vector<PreparedGaussian> prepare(const Parameters& parameters, const TraceOptions& options) {
+  std::vector<PreparedGaussian> out(parameters.size());
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i].mean = parameters.mean(i);
+    out[i].whitening = whitening_matrix(parameters, i);
+    out[i].opacity = sigmoid(parameters.opacities[i]);
+    out[i].quantile = effective_quantile(options, out[i].opacity);
+  }
+  return out;
+}
+
+RayTrace trace_ray(const Parameters& parameters,
+                   const TraceOptions& options,
+                   const glm::dvec3& origin,
+                   const glm::dvec3& direction,
+                   double t_min,
+                   double t_max,
+                   ColorMode color_mode) {
+  return trace_ray(parameters, prepare(parameters, options), options, origin, direction, t_min,
+                   t_max, color_mode);
+}
+
+RayTrace trace_ray(const Parameters& parameters,
+                   const std::vector<PreparedGaussian>& prepared,
+                   const TraceOptions& options,
+                   const glm::dvec3& origin,
+                   const glm::dvec3& direction,
+                   double t_min,
+                   double t_max,
+                   ColorMode color_mode,
+                   const Cone& cone) {
+  RayTrace out;
+  std::vector<Hit> all;
+  for (std::size_t i = 0; i < prepared.size(); ++i) {
+    PreparedGaussian seen = prepared[i];
+    const glm::dvec3 offset = seen.mean - origin;
+    const double least = cone.width + cone.spread * glm::dot(direction, offset);
+    if (least > 0.0) {
+      raise_axes(parameters, options, i, least, cone.spread * offset + cone.width * direction,
+                 seen);
+    }
+    Hit hit;
+    hit.index = static_cast<std::uint32_t>(i);
+    if (intersect(seen, options, origin, direction, t_min, t_max, hit, out.margin))
+      all.push_back(hit);
+  }
+  std::sort(all.begin(), all.end(),
+            [](const Hit& a, const Hit& b) { return a.t != b.t ? a.t < b.t : a.index < b.index; });
+
+  const double stop = options.min_transmittance;
+  const auto max_hits = static_cast<std::size_t>(std::max(options.max_hits, 0));
+  double depth_sum = 0.0;
+  double weight_sum = 0.0;
+  double& transmittance = out.transmittance;
+  for (std::size_t n = 0; n < all.size(); ++n) {
+    if (n > 0) lower(out.margin, all[n].t - all[n - 1].t, all[n].t);
+    if (transmittance < stop) break;
+    if (n == max_hits) {
+      out.capped = true;
+      break;
+    }
+    Hit& hit = all[n];
+    const std::size_t i = hit.index;
+    hit.transmittance = transmittance;
+    hit.color =
+        color(parameters, i, color_direction(color_mode, prepared[i].mean, origin, direction));
+    const double weight = transmittance * hit.alpha;
+    out.color += weight * hit.color;
+    depth_sum += weight * hit.t_peak;
+    weight_sum += weight;
+    transmittance *= 1.0 - hit.alpha;
+    if (hit.transmittance >= 0.5 && transmittance < 0.5) out.median_depth = hit.t_peak;
+    lower(out.margin, transmittance - stop, stop);
+    out.hits.push_back(hit);
+  }
+  out.color += transmittance * light_behind(options, direction);
+  out.alpha = 1.0 - transmittance;
+  if (weight_sum > 0.0) out.expected_depth = depth_sum / weight_sum;
+  return out;
+}
+
+Cone pixel_cone(const Camera& camera, const TraceOptions& options, const glm::dvec3& direction) {
+  const double pixel = static_cast<double>(options.view_footprint) * pixel_spacing(camera);
+  if (camera.model == CameraModel::kOrthographic) return {pixel, 0.0};
+  const bool around =
+      camera.model == CameraModel::kFisheye || camera.model == CameraModel::kEquirectangular;
+  return {0.0, pixel * (around ? 1.0 : (camera.rotation * direction).z)};
+}
+
+glm::dvec3 pixel_direction(const Camera& camera, int column, int row) {
+  return {(column + 0.5 - camera.cx) / camera.fx, (row + 0.5 - camera.cy) / camera.fy, 1.0};
+}
 
 std::vector<PreparedGaussian> prepare_view(const Parameters& parameters,
                                            const TraceOptions& options,

@@ -53,6 +53,12 @@ struct PreparedGaussian {
 };
 std::vector<PreparedGaussian> prepare(const Parameters& parameters, const TraceOptions& options);
 
+/// How wide a ray is at t along its direction of unit length: width + spread t.
+struct Cone {
+  double width = 0.0;
+  double spread = 0.0;
+};
+
 /// Brute force over all Gaussians, directly after docs/model.md. A hit's key must lie in [t_min,
 /// t_max] and be at least 0. `direction` need not be normalised. near_depth has no meaning for a
 /// single ray and is ignored.
@@ -63,7 +69,8 @@ RayTrace trace_ray(const Parameters& parameters,
                    double t_min,
                    double t_max,
                    ColorMode color_mode);
-/// The same for Gaussians from prepare().
+/// The same for Gaussians from prepare(), as a cone sees them: none thinner than it is beside their
+/// means.
 RayTrace trace_ray(const Parameters& parameters,
                    const std::vector<PreparedGaussian>& prepared,
                    const TraceOptions& options,
@@ -71,7 +78,8 @@ RayTrace trace_ray(const Parameters& parameters,
                    const glm::dvec3& direction,
                    double t_min,
                    double t_max,
-                   ColorMode color_mode);
+                   ColorMode color_mode,
+                   const Cone& cone = {});
 
 struct Render {
   int width = 0;
@@ -85,6 +93,9 @@ struct Render {
 
   std::size_t pixels() const { return pixel_count(width, height); }
 };
+
+/// The cone of a ray of the camera along a unit direction in world coordinates.
+Cone pixel_cone(const Camera& camera, const TraceOptions& options, const glm::dvec3& direction);
 
 /// Direction (X, Y, 1) of a pixel's centre in camera axes: t is then the depth along the camera's z
 /// axis.

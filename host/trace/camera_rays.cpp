@@ -5,6 +5,7 @@
 
 #include "raysplats/error.hpp"
 #include "scene/camera/camera_model.hpp"
+#include "scene/camera/pixel_spacing.hpp"
 #include "scene/image/pixel_count.hpp"
 #include "shared/layout.h"
 
@@ -12,6 +13,10 @@ namespace raysplats {
 namespace {
 
 constexpr std::size_t kGroup = 64;
+
+BuildOptions build_of(const Camera& camera) {
+  return BuildOptions().define("CAMERA_MODEL", camera_model_number(camera.model));
+}
 
 }  // namespace
 
@@ -107,11 +112,20 @@ void CameraRays::generate(const Camera& camera,
                     first_pixel, first_pixel + count, camera.width, camera.height));
   }
   if (rays.size() < count) rays.ensure(context_, count, "camera rays");
-  context_
-      .kernel("trace/camera_rays.cl", "camera_rays",
-              BuildOptions().define("CAMERA_MODEL", camera_model_number(camera.model)))
+  context_.kernel("trace/camera_rays.cl", "camera_rays", build_of(camera))
       .launch(Range::linear(count, kGroup), lens_camera(camera, lens),
               static_cast<std::uint32_t>(first_pixel), static_cast<std::uint32_t>(count), rays);
+}
+
+void CameraRays::cones(const Camera& camera,
+                       float footprint,
+                       const Buffer<Ray>& rays,
+                       std::size_t count,
+                       Buffer<RsCone>& cones) {
+  cones.ensure(context_, count, "cones of camera rays");
+  context_.kernel("trace/camera_rays.cl", "camera_cones", build_of(camera))
+      .launch(Range::linear(count, kGroup), static_cast<std::uint32_t>(count), depth_axis(camera),
+              footprint_width(camera, footprint), rays, cones);
 }
 
 }  // namespace raysplats

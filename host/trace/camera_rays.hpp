@@ -9,6 +9,7 @@
 #include "device/context.hpp"
 #include "raysplats/camera.hpp"
 #include "shared/layout.h"
+#include "shared/ray_layout.h"
 #include "trace/ray_tracer.hpp"
 
 namespace raysplats {
@@ -54,6 +55,13 @@ class CameraRays {
                 std::size_t first_pixel,
                 std::size_t count,
                 Buffer<Ray>& rays);
+  /// Writes the cones of the first `count` of the camera's rays: `footprint` pixels wide, as the
+  /// footprint of a view. Enqueues and returns.
+  void cones(const Camera& camera,
+             float footprint,
+             const Buffer<Ray>& rays,
+             std::size_t count,
+             Buffer<RsCone>& cones);
 
  private:
   Context& context_;

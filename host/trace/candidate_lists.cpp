@@ -80,8 +80,7 @@ RsCamera device_camera(const Camera& camera, const TraceOptions& options, int fa
   out.width = camera.width;
   out.height = camera.height;
   out.near_depth = options.near_depth;
-  out.footprint =
-      static_cast<float>(static_cast<double>(options.view_footprint) * pixel_spacing(camera));
+  out.footprint = footprint_width(camera, options.view_footprint);
   check_camera(camera, out);
   return out;
 }

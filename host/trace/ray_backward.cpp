@@ -74,6 +74,8 @@ void RayBackward::begin(const DeviceGaussians& gaussians,
                         const RayScreen& screen,
                         std::size_t rays) {
   tracer_->require_current(gaussians);
+  if (has_cones(tracer_->options()))
+    throw UsageError("Gradients of cones are not known: trace without a view_footprint");
   for (std::size_t k = 0; k < 3; ++k) {
     for (std::size_t j = 0; j < 3; ++j)
       shares_.screen[3 * k + j] = static_cast<float>(screen.rows[k][j]);

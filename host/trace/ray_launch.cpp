@@ -20,10 +20,16 @@ constexpr std::size_t kOrderedRays = 4096;
 }  // namespace
 
 bool walks_tree(const TraceOptions& options, const DeviceInfo& device) {
-  // Rays have no footprint, and what a device is tuned to changes no picture.
+  // The gradient of a footprint is known in packets alone, and what a device is tuned to changes no
+  // picture.
   if (options.traversal == Traversal::kAuto)
     return device.tuning && device.tuning->bvh && options.view_footprint <= 0;
   return options.traversal == Traversal::kBvh;
+}
+
+TraceOptions of_bare_rays(TraceOptions options) {
+  options.view_footprint = 0;
+  return options;
 }
 
 RayNear RayNear::of(const Camera& camera, float near_depth) {
@@ -58,7 +64,8 @@ BuildOptions ray_walk_build(const TreeForm& form,
   build.define("NEAR_LIMIT", near.limited ? 1 : 0)
       .define("LENS", near.lens)
       .define("ADAPTIVE_RADIUS", options.adaptive_radius ? 1 : 0)
-      .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0);
+      .define("PEAK_ORDER", options.hit_order == HitOrder::kPeak ? 1 : 0)
+      .define("CONES", has_cones(options) ? 1 : 0);
   if (form.trail) {
     build.define("KEPT", kKept).define("SH_DEGREE", sh_degree);
   } else {

@@ -23,6 +23,9 @@ namespace raysplats {
 /// Whether the rays of cameras walk the tree where they could be traced by tiles as well.
 bool walks_tree(const TraceOptions& options, const DeviceInfo& device);
 
+/// Options of rays that are no cones.
+TraceOptions of_bare_rays(TraceOptions options);
+
 /// Gaussians whose means are too near to a ray's origin are not met: what TraceOptions::near_depth
 /// is for the rays of a camera.
 struct RayNear {

@@ -38,7 +38,8 @@ struct RayTracer::Impl {
         tree(context_in, options_in, form),
         order(context_in),
         budget(options_in.launch_budget_ms, context_in.device().type),
-        no_flags(context_in, 1, "no flags of rays") {}
+        no_flags(context_in, 1, "no flags of rays"),
+        no_cones(context_in, 1, "no cones") {}
 
   Context& context;
   TraceOptions options;
@@ -48,6 +49,7 @@ struct RayTracer::Impl {
   RayOrder order;
   LaunchBudget budget;
   Buffer<std::uint32_t> no_flags;
+  Buffer<RsCone> no_cones;
   Buffer<Ray> rays;
   Buffer<RayResult> results;
   bool counts_work = false;
@@ -90,19 +92,21 @@ void RayTracer::trace(const DeviceGaussians& gaussians,
                       const Buffer<Ray>& rays,
                       std::size_t count,
                       Buffer<RayResult>& results,
-                      ColorDirection color_direction) {
-  launch(gaussians, rays, count, results, color_mode(color_direction), impl_->no_flags);
+                      ColorDirection color_direction,
+                      const Buffer<RsCone>* cones) {
+  launch(gaussians, rays, count, results, color_mode(color_direction), impl_->no_flags, cones);
 }
 
 void RayTracer::trace(const DeviceGaussians& gaussians,
                       const Buffer<Ray>& rays,
                       const Buffer<std::uint32_t>& from_origin,
                       std::size_t count,
-                      Buffer<RayResult>& results) {
+                      Buffer<RayResult>& results,
+                      const Buffer<RsCone>* cones) {
   if (from_origin.size() < count) {
     throw UsageError(fmt::format("{} rays need as many flags, not {}", count, from_origin.size()));
   }
-  launch(gaussians, rays, count, results, kFlagPerRay, from_origin);
+  launch(gaussians, rays, count, results, kFlagPerRay, from_origin, cones);
 }
 
 void RayTracer::launch(const DeviceGaussians& gaussians,
@@ -110,9 +114,15 @@ void RayTracer::launch(const DeviceGaussians& gaussians,
                        std::size_t count,
                        Buffer<RayResult>& results,
                        std::int32_t color_mode,
-                       const Buffer<std::uint32_t>& from_origin) {
+                       const Buffer<std::uint32_t>& from_origin,
+                       const Buffer<RsCone>* cones) {
   Impl& self = *impl_;
   require_current(gaussians);
+  if (cones != nullptr && !has_cones(self.options))
+    throw UsageError("Rays are cones only where there is a view_footprint: set it");
+  if (cones != nullptr && cones->size() < count) {
+    throw UsageError(fmt::format("{} rays need as many cones, not {}", count, cones->size()));
+  }
   if (rays.size() < count) {
     throw UsageError(fmt::format("{} rays cannot be traced from a buffer of {}: pass a larger one",
                                  count, rays.size()));
@@ -126,12 +136,19 @@ void RayTracer::launch(const DeviceGaussians& gaussians,
   BuildOptions build = ray_walk_build(tree.form(), options, self.near, gaussians.active_sh_degree);
   if (self.counts_work) build.define("COUNT_WORK", 1);
   build.define("LEADING", color_mode == kFlagPerRay ? 1 : 0);
-  launch_in_bands(self.context, self.budget,
-                  self.context.kernel("trace/ray_tracer.cl", "trace_rays", build),
-                  (count + rays_per_item - 1) / rays_per_item, shares ? 1 : kGroup, u32(count),
-                  u32(rays_per_item), self.tree.arguments(), gaussians.sh,
-                  ray_walk(options, self.near, gaussians, color_mode),
-                  self.order.arguments(rays, ordered), from_origin, results);
+  RsRayWalk walk = ray_walk(options, self.near, gaussians, color_mode);
+  walk.has_cones = cones != nullptr ? 1 : 0;
+  Kernel kernel = self.context.kernel("trace/ray_tracer.cl", "trace_rays", build);
+  const auto run = [&](const auto& kinds) {  // RS_RAY_KINDS
+    launch_in_bands(self.context, self.budget, kernel, (count + rays_per_item - 1) / rays_per_item,
+                    shares ? 1 : kGroup, u32(count), u32(rays_per_item), self.tree.arguments(),
+                    gaussians.sh, walk, self.order.arguments(rays, ordered), kinds, results);
+  };
+  if (has_cones(options)) {
+    run(argument_pack(from_origin, cones != nullptr ? *cones : self.no_cones));
+  } else {
+    run(argument_pack(from_origin));
+  }
 }
 
 void RayTracer::count_work() { impl_->counts_work = true; }

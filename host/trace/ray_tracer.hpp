@@ -12,6 +12,7 @@
 #include "device/context.hpp"
 #include "raysplats/rays.hpp"
 #include "raysplats/trace_options.hpp"
+#include "shared/ray_layout.h"
 #include "trace/device_gaussians.hpp"
 #include "trace/ray_launch.hpp"
 #include "trace/ray_tree.hpp"
@@ -19,8 +20,9 @@
 namespace raysplats {
 
 /// Traces arbitrary rays: any origins and directions, without coherence. The order of hits is exact
-/// per ray; near_depth, view_footprint and depth of the options have no meaning here, but see
-/// set_near().
+/// per ray; near_depth and depth of the options have no meaning here, but see set_near(). With a
+/// view_footprint rays may be cones (cl/trace/ray_cone.h), which takes half more memory for a
+/// Gaussian and more time; its gradients are not known.
 class RayTracer {
  public:
   RayTracer(Context& context, const TraceOptions& options);
@@ -41,12 +43,15 @@ class RayTracer {
                                std::span<const Ray> rays,
                                ColorDirection color_direction = ColorDirection::kRay);
   /// The first `count` of `rays`, already on the device, into the first of `results`, which grows
-  /// when it is smaller. Enqueues and returns, unless the options bound the time of a launch.
+  /// when it is smaller. `cones`: of each ray, by CameraRays::cones(); without any, rays see the
+  /// Gaussians as they are. Enqueues and returns, unless the options bound the time of a launch.
+  /// Throws UsageError for cones where the options have no view_footprint.
   void trace(const DeviceGaussians& gaussians,
              const Buffer<Ray>& rays,
              std::size_t count,
              Buffer<RayResult>& results,
-             ColorDirection color_direction = ColorDirection::kRay);
+             ColorDirection color_direction = ColorDirection::kRay,
+             const Buffer<RsCone>* cones = nullptr);
   /// The same for paths: colours from the origin for rays whose from_origin is 1, along the ray
   /// where it is 0, and instead of the number of hits the Gaussian that leads them: the one of the
   /// median depth, or the one that shows most where there is none.
@@ -54,7 +59,8 @@ class RayTracer {
              const Buffer<Ray>& rays,
              const Buffer<std::uint32_t>& from_origin,
              std::size_t count,
-             Buffer<RayResult>& results);
+             Buffer<RayResult>& results,
+             const Buffer<RsCone>* cones = nullptr);
 
   /// Colour behind the Gaussians from the next trace() on.
   void set_background(const std::array<float, 3>& background);
@@ -79,7 +85,8 @@ class RayTracer {
               std::size_t count,
               Buffer<RayResult>& results,
               std::int32_t color_mode,
-              const Buffer<std::uint32_t>& from_origin);
+              const Buffer<std::uint32_t>& from_origin,
+              const Buffer<RsCone>* cones);
 
   struct Impl;
   std::unique_ptr<Impl> impl_;

@@ -18,6 +18,7 @@ constexpr std::size_t kGroup = 64;
 }  // namespace
 
 std::size_t RayTree::block_floats(const TraceOptions& options, const TreeForm& form) {
+  if (has_cones(options)) return RS_CONE_VECTORS;
   return RS_GAUSSIAN_VECTORS(has_quantiles(options, form) ? 1 : 0);
 }
 
@@ -69,7 +70,8 @@ void RayTree::fill(const DeviceGaussians& gaussians) {
   if (gaussians.count == 0) return;
   BuildOptions build = tree_build(tree_.form());
   build.define("SIGMOID_SCALE", gaussians.activation == ScaleActivation::kSigmoid ? 1 : 0)
-      .define("ADAPTIVE_RADIUS", options_.adaptive_radius ? 1 : 0);
+      .define("ADAPTIVE_RADIUS", options_.adaptive_radius ? 1 : 0)
+      .define("CONES", has_cones(options_) ? 1 : 0);
   const std::size_t padded = tree_.padded_blocks();
   context_->kernel("trace/ray_tree.cl", "fill_blocks", build)
       .launch(Range::linear(padded, kGroup), u32(gaussians.count), u32(padded), tree_.slots(),

@@ -10,6 +10,9 @@
 
 namespace raysplats {
 
+/// Whether rays may be cones, for which leaf blocks have axes and scales.
+inline bool has_cones(const TraceOptions& options) { return options.view_footprint > 0; }
+
 /// The tree over Gaussians that rays walk: an Lbvh with the Gaussians themselves, ready to be
 /// traced, in its leaf blocks (cl/trace/ray_block.h).
 class RayTree {

@@ -101,11 +101,12 @@ RayTreeCopy RayTreeCopy::of(const RayTree& tree) {
 }
 
 std::size_t RayTreeCopy::index_at(std::size_t slot) const {
+  if (has_cones(options)) return at(slot, RS_CONE_INDEX);
   return at(slot, RS_GAUSSIAN_INDEX(RayTree::has_quantiles(options, tree.form()) ? 1 : 0));
 }
 
 std::size_t RayTreeCopy::mean_at(std::size_t slot, std::size_t axis) const {
-  return at(slot, RS_GAUSSIAN_MEAN + axis);
+  return at(slot, (has_cones(options) ? RS_CONE_MEAN : RS_GAUSSIAN_MEAN) + axis);
 }
 
 std::size_t RayTreeCopy::at(std::size_t slot, std::size_t k) const {

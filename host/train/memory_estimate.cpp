@@ -57,7 +57,8 @@ RayShare rays_per_gaussian(const TrainOptions& options,
   const std::size_t lines =
       RayBackward::sum_lines(options.sh_degree) * sizeof(GradientSums::Line) * choice.copies;
   const std::size_t exact = choice.sum == GradientSum::kExact ? lines * RS_EXACT_WORDS : 0;
-  const std::size_t block = sizeof(float) * RayTree::block_floats(options.trace, form);
+  const std::size_t block =
+      sizeof(float) * RayTree::block_floats(of_bare_rays(options.trace), form);
   // Box, tree, record.
   return {sizeof(RsAabb) + Lbvh::bytes_per_box(form) + block + 64 + lines + exact,
           std::max({lines, exact, block})};

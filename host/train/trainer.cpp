@@ -87,7 +87,10 @@ TrainOptions complete_options(TrainOptions options, const Dataset& dataset) {
   options.data = data_options(options.data, dataset);
   if (float& footprint = options.trace.view_footprint; !may_trace_packets(options, dataset)) {
     if (footprint != 0 && footprint != TrainOptions().trace.view_footprint)
-      spdlog::warn("--view-footprint {:g} is left out: rays one by one have no pixel", footprint);
+      spdlog::warn(
+          "--view-footprint {:g} is left out: its gradient is not known where rays are traced one "
+          "by one",
+          footprint);
     footprint = 0;  // so that the files of the run say how the model was trained
   }
   options.iterations = run_length(options, dataset.indices(Split::kTrain).size());

@@ -22,7 +22,8 @@ namespace raysplats {
 /// rays without the ones that have ended (Laine, Karras and Aila 2013). With one sample per pixel
 /// the rays of a camera with a centre are traced in packets as Tracer does, unless lights on
 /// Gaussians ask for more; rays that end on a surface are traced once more. Of Scene::trace
-/// near_depth, view_footprint, background and sky mean nothing here. Threads: as Context.
+/// near_depth, background and sky mean nothing here; view_footprint is of the pixel divided by the
+/// root of RenderSettings::samples. Threads: as Context.
 class PathTracer {
  public:
   /// Numbers of rays of the last render().

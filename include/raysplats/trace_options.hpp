@@ -15,12 +15,12 @@ enum class HitOrder {
 };
 
 /// How the rays of a camera find the Gaussians they meet. Pictures and gradients are the same
-/// within rounding, but for TraceOptions::view_footprint.
+/// within rounding, but for what TraceOptions::view_footprint says.
 enum class Traversal {
   kAuto,   ///< tiles, or without a view_footprint what the device's tuning says; rays one by one
            ///< where tiles cannot be
   kTiles,  ///< packets of rays share the candidate list of their tile of the picture
-  kBvh,    ///< every ray walks the bounding volume hierarchy (the paper); no view_footprint
+  kBvh,    ///< every ray walks the bounding volume hierarchy (the paper)
 };
 
 /// What a packet of camera rays is made of.
@@ -64,10 +64,11 @@ struct TraceOptions {
   bool adaptive_radius = false;  ///< Q shrinks where opacity * response would be below 1/255
   float near_depth =
       0.0f;  ///< Gaussians whose mean is nearer along the view axis are skipped; 0 = off
-  /// Views of cameras that packets trace show no axis of a Gaussian thinner than this share of
-  /// their pixels: thinner ones are raised to it, and the opacity falls as the area of the outline
-  /// grows (the screen filter of Yu et al. 2024, "Mip-Splatting"). Rays one by one have no pixel. 0
-  /// = off
+  /// Pictures show no axis of a Gaussian thinner than this share of their pixels: thinner ones are
+  /// raised to it, and the opacity falls as the area of the outline grows (the screen filter of Yu
+  /// et al. 2024, "Mip-Splatting"). Rays one by one, those of mirrors and scenes among them, are
+  /// cones as wide as that, which agrees to first order. Their gradient is not known: pictures that
+  /// are differentiated ray by ray have no footprint. 0 = off
   float view_footprint = 0.0f;
   std::array<float, 3> background{0.0f, 0.0f, 0.0f};  ///< colour behind everything
   SkyLight sky;  ///< behind everything in views of cameras, in place of `background`; empty: none

@@ -85,9 +85,9 @@ class Tracer {
   /// Rays of any origins and directions. Throws UsageError, naming the ray, for a number that is
   /// not finite (t_max may be infinite), a direction of length 0, and ends that are not
   /// 0 <= t_min <= t_max; for a model of another context; and for options.near_depth, options.sky
-  /// and mirrors, which belong to cameras; so does options.view_footprint, which means nothing
-  /// here. `within` hears the share of the rays that is done, as in render(), and returns false to
-  /// stop; then there are no results.
+  /// and mirrors, which belong to cameras. options.view_footprint means nothing here: these rays
+  /// have no pixel. `within` hears the share of the rays that is done, as in render(), and returns
+  /// false to stop; then there are no results.
   std::vector<RayResult> trace(const Model& model,
                                std::span<const Ray> rays,
                                ColorDirection direction = ColorDirection::kRay,

@@ -27,6 +27,7 @@ ROWS = [
     ("`fill_tiles`", 64, False, "lists: fill_tiles"),
     ("`scatter` (radix sort)", 256, False, "sort pairs: scatter"),
     ("`trace_rays`", 64, True, "rays: trace_rays"),
+    ("`trace_rays`, cones", 64, True, "cones: trace_rays"),
     ("`ray_backward` (SH 3, atomic)", 64, True, "ray backward atomic: ray_backward"),
     ("`ray_backward` (SH 3, exact)", 64, True, "ray backward exact: ray_backward"),
     ("`nearest_surface`", 64, False, "surface rays: nearest_surface"),

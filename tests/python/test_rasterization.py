@@ -213,6 +213,20 @@ def test_rasterization_antialiased_shows_nothing_thinner_than_pixels(context):
     assert scene["scales"].grad.abs().max() > 0
 
 
+def test_rasterization_has_no_gradient_through_the_footprint_of_rays(context):
+    scene = gsplat_scene(views=1)
+    scene["scales"].requires_grad_()
+    options = rs.TraceOptions.peak_order()
+    options.traversal = "bvh"
+    for more in ({"camera_model": "ortho", "rasterize_mode": "antialiased"}, {"options": options}):
+        with pytest.raises(NotImplementedError, match="footprint"):
+            rt.rasterization(**scene, **more)
+        with torch.no_grad():
+            assert torch.isfinite(rt.rasterization(**scene, **more)[1]).all()
+    rt.rasterization(**scene, camera_model="ortho")[1].sum().backward()
+    assert scene["scales"].grad.abs().max() > 0
+
+
 # What is not supported: every argument of gsplat's is used, or refused by its name.
 REFUSED = {
     "far_plane": 10.0, "radius_clip": 1.0, "eps2d": 0.3, "packed": True, "tile_size": 16, "sparse_grad": True,

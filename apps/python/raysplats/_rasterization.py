@@ -305,8 +305,14 @@ def rasterization(
         _refuse("gradients of Ks", "call detach()")
     needs_depth = render_mode != "RGB"
     inputs = (means, quats, scales, opacities, colors, viewmats)
-    if needs_depth and torch.is_grad_enabled() and any(each.requires_grad for each in inputs):
+    differentiated = torch.is_grad_enabled() and any(each.requires_grad for each in inputs)
+    if needs_depth and differentiated:
         _refuse(f"gradients with render_mode='{render_mode}'", "those of depths are not computed; use torch.no_grad()")
+    has_footprint = rasterize_mode == "antialiased" or (options is not None and options.view_footprint > 0)
+    by_rays = camera_model == "ortho" or (options is not None and options.traversal == "bvh")
+    if differentiated and has_footprint and by_rays:
+        _refuse("gradients of a footprint where rays are traced one by one",
+                "use rasterize_mode='classic' and options with a view_footprint of 0, or torch.no_grad()")
     per_view = _check_colors(colors, sh_degree, count, views)
     if backgrounds is not None:
         require_shape("backgrounds", backgrounds, (views, 3))

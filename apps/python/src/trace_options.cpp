@@ -68,8 +68,8 @@ void bind_trace_options(nb::module_& module) {
       .def_rw("near_depth", &TraceOptions::near_depth,
               "Gaussians nearer along the viewing axis are skipped; 0 = off.")
       .def_rw("view_footprint", &TraceOptions::view_footprint,
-              "Views of cameras show nothing thinner than this share of a pixel, and what is "
-              "thinner fainter; 0 = off.")
+              "Pictures show nothing thinner than this share of a pixel, and what is thinner "
+              "fainter, but in differentiable ones whose rays are traced one by one; 0 = off.")
       .def_rw("background", &TraceOptions::background, "Colour behind everything.")
       .def_prop_rw(
           "sky", [](const TraceOptions& o) { return tuple_of(o.sky); },

@@ -245,8 +245,8 @@ TraceSettings read_trace(TomlTable& table) {
   };
   read("q", "quantile");
   for (const char* name : {"quantile", "min-transmittance", "max-hits", "hit-order",
-                           "adaptive-radius", "near", "traversal", "background", "packet-width",
-                           "packet-shape", "memory-budget", "launch-budget-ms"}) {
+                           "adaptive-radius", "near", "view-footprint", "traversal", "background",
+                           "packet-width", "packet-shape", "memory-budget", "launch-budget-ms"}) {
     read(name, name);
   }
   const TraceOptions given = t.over({});

@@ -21,4 +21,8 @@ double pixel_spacing(const Camera& camera) {
   return 0.0;
 }
 
+float footprint_width(const Camera& camera, float footprint) {
+  return static_cast<float>(static_cast<double>(footprint) * pixel_spacing(camera));
+}
+
 }  // namespace raysplats

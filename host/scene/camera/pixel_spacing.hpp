@@ -10,4 +10,7 @@ namespace raysplats {
 /// no picture.
 double pixel_spacing(const Camera& camera);
 
+/// The share `footprint` of that, as kernels take it.
+float footprint_width(const Camera& camera, float footprint);
+
 }  // namespace raysplats

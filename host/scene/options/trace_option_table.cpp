@@ -90,9 +90,9 @@ void add_trace_options(OptionTable& t, TraceOptions& o) {
   t.number("near", o.near_depth, 0, kNoBound,
            "Gaussians nearer to the camera plane are skipped; 0 = off");
   t.number("view-footprint", o.view_footprint, 0, 10,
-           "a view shows no axis of a Gaussian thinner than this share of its pixels, and thinner "
-           "ones fainter, as pixels see them on average; 0 = off, as always where rays are traced "
-           "one by one");
+           "pictures show no axis of a Gaussian thinner than this share of their pixels, and "
+           "thinner ones fainter, as pixels see them on average; training ray by ray is without; "
+           "0 = off");
   t.choice<Traversal>(
       "traversal", o.traversal,
       {{"auto", Traversal::kAuto}, {"tiles", Traversal::kTiles}, {"bvh", Traversal::kBvh}},

@@ -91,15 +91,20 @@ TEST_CASE("depths and normals of Gaussians and surfaces before and behind each o
 
 TEST_CASE("without surfaces first hits are the depths, normals and hits of the model [small]") {
   Context context = make_test_context();
-  const Scene scene = cloud_scene(2);
+  Scene scene = cloud_scene(2);
   const Model model(context, scene.gaussians);
-  TraceOptions options = scene.trace;
-  options.depth = true;
-  Tracer plain(context, options);
-  PathTracer tracer(context, scene);
   Camera camera = reference::cube_camera(24, 20);
-  for (const CameraModel lens : {CameraModel::kPinhole, CameraModel::kFisheye}) {
+  for (const auto& [lens, footprint] :
+       {std::pair(CameraModel::kPinhole, 0.0f), std::pair(CameraModel::kFisheye, 0.0f),
+        std::pair(CameraModel::kPinhole, 6.0f)}) {
     camera.model = lens;
+    scene.trace.view_footprint = footprint;
+    TraceOptions options = scene.trace;
+    options.depth = true;
+    // Packets show what is wider than a ray's neighbours a little otherwise.
+    if (footprint > 0) options.traversal = Traversal::kBvh;
+    Tracer plain(context, options);
+    PathTracer tracer(context, scene);
     const Image rgba = plain.render(model, camera);
     const PathTracer::FirstHits first = tracer.first_hits(camera);
     const Image depth = plain.depth();

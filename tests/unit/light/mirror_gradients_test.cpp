@@ -23,7 +23,8 @@ Seen see(const reference::Parameters& parameters,
          const TraceOptions& options,
          const std::vector<Panel>& panels,
          int max_bounces,
-         const CameraRay& ray) {
+         const CameraRay& ray,
+         reference::Cone cone = {}) {
   Seen out;
   const glm::dvec3 background(options.background[0], options.background[1], options.background[2]);
   TraceOptions dark = options;
@@ -50,8 +51,8 @@ Seen see(const reference::Parameters& parameters,
       normal = n;
     }
     const reference::RayTrace traced = reference::trace_ray(
-        parameters, dark, origin, direction, 0.0, t_end,
-        bounce == 0 ? reference::ColorMode::kFromOrigin : reference::ColorMode::kAlongRay);
+        parameters, reference::prepare(parameters, dark), dark, origin, direction, 0.0, t_end,
+        bounce == 0 ? reference::ColorMode::kFromOrigin : reference::ColorMode::kAlongRay, cone);
     out.margin = std::min(out.margin, traced.margin);
     for (const reference::Hit& hit : traced.hits) out.hits.push_back(hit.index);
     out.hits.push_back(0xffffffffu);
@@ -68,6 +69,7 @@ Seen see(const reference::Parameters& parameters,
     }
     weight *= met->tint;
     origin += t_end * direction;
+    cone.width += cone.spread * t_end;
     direction -= 2.0 * glm::dot(direction, normal) * normal;
     from = met;
   }
@@ -171,4 +173,44 @@ TEST_CASE("gradients through mirrors equal finite differences of a double refere
     }
     CHECK_ERRORS(errors_of(got.gradients, numeric), 1e-3);
   }
+}
+
+TEST_CASE("mirrors show the footprint of a view, in any batches [small]") {
+  Context context = make_test_context();
+  Gaussians model = reference::random_scene(60, 94, 1);
+  for (float& scale : model.log_scales) scale -= 1.5f;
+  TraceOptions options = peak_order();
+  options.view_footprint = 0.6f;
+  options.background = {0.3f, 0.5f, 0.2f};
+  const reference::Parameters parameters(model);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const Camera camera = look_at({0, 0, -4}, {0.3, 0.1, 0}, {0, -1, 0}, 80, 70, 60);
+  const std::vector<Panel> panels{{{-2, -2, 1.3}, {4, 0, 0}, {0, 4, 0}, {0.9, 0.7, 0.8}},
+                                  {{1.4, -2, -1.5}, {0.3, 0, 2.9}, {0, 4, 0}, {0.5, 0.9, 0.6}}};
+  ViewTracer tracer(context, options, mirrors_of(panels, 3));
+  tracer.forward(gaussians, camera);
+  const Image image = tracer.download_image();
+  std::size_t compared = 0, wrong = 0, reflected = 0;
+  for (std::size_t i = 0; i < image.pixels(); i += 7) {
+    const CameraRay ray =
+        camera_ray(camera, static_cast<double>(i % 80) + 0.5, static_cast<double>(i / 80) + 0.5);
+    const Seen expected = see(parameters, options, panels, 3, ray,
+                              reference::pixel_cone(camera, options, ray.direction));
+    if (expected.margin < 1e-4) continue;
+    ++compared;
+    reflected += std::count(expected.hits.begin(), expected.hits.end(), 0xffffffffu) > 1 ? 1 : 0;
+    double worst = std::abs(static_cast<double>(image.data[4 * i + 3]) - expected.alpha);
+    for (int c = 0; c < 3; ++c) {
+      const std::size_t at = 4 * i + static_cast<std::size_t>(c);
+      worst = std::max(worst, std::abs(static_cast<double>(image.data[at]) - expected.color[c]));
+    }
+    wrong += worst < 2e-3 ? 0 : 1;
+  }
+  CHECK(wrong == 0);
+  CHECK(compared > 500);
+  CHECK(reflected > 300);
+  options.memory_budget = 1000;
+  ViewTracer in_batches(context, options, mirrors_of(panels, 3));
+  in_batches.forward(gaussians, camera);
+  CHECK(in_batches.download_image().data == image.data);
 }

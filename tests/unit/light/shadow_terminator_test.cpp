@@ -169,12 +169,14 @@ TEST_CASE("rays to lights leave flat triangles where they did, to the bit [small
       return context.kernel("light/path_tracer.cl", name);
     };
     const Range each = Range::linear(kRays, 64);
-    kernel("begin_paths").launch(each, count, 1, rays, paths);
+    Buffer<RsCone> cones(context, kRays, "cones of rays");
+    cones.clear();
+    kernel("begin_paths").launch(each, count, 1, rays, cones, paths);
     surfaces.triangles().nearest(rays, kRays, hits);
     kernel("load_surfaces")
         .launch(each, count, hits, surfaces.vertices(), surfaces.triangle_materials(),
                 surfaces.materials(), surfaces.textures(), surfaces.texels(), paths, rays,
-                from_origin, met);
+                from_origin, cones, met);
     std::size_t surfaces_met = 0, moved = 0;
     for (const RsSurface& s : met.download()) {
       if (s.material < 0) continue;

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "scene/camera/camera_model.hpp"
 #include "unit/light/view_fixture.hpp"
 
 using namespace raysplats;
@@ -115,4 +117,91 @@ TEST_CASE("traversal auto is what the tuning says [small]") {
   tuning.bvh = true;
   context.set_tuning(tuning);
   CHECK(picture(Traversal::kAuto) == bvh);
+}
+
+TEST_CASE("every traversal shows the footprint of a view, through every lens") {
+  Context context = make_test_context();
+  Gaussians model = reference::random_scene(500, 48, 2);
+  for (float& scale : model.log_scales) scale -= 2.0f;  // most of them thinner than a pixel
+  const reference::Parameters parameters(model);
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  for (const CameraModel lens : {CameraModel::kPinhole, CameraModel::kOpenCv, CameraModel::kFisheye,
+                                 CameraModel::kEquirectangular, CameraModel::kOrthographic}) {
+    CAPTURE(static_cast<int>(lens));
+    const Camera camera = view_of(lens, 48, 36, lens == CameraModel::kOrthographic ? 12 : 30);
+    const auto draw = [&](Traversal traversal, float footprint) {
+      TraceOptions options = peak_order();
+      options.view_footprint = footprint;
+      options.traversal = traversal;
+      ViewTracer tracer(context, options);
+      tracer.forward(gaussians, camera);
+      return tracer.download_image();
+    };
+    const Image tree = draw(Traversal::kBvh, 0.5f), bare = draw(Traversal::kBvh, 0.0f);
+    double shown = 0, apart = 0, by_footprint = 0;
+    for (std::size_t i = 0; i < tree.pixels(); ++i) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        shown += std::abs(static_cast<double>(tree.data[4 * i + c]));
+        by_footprint += std::abs(static_cast<double>(tree.data[4 * i + c]) - bare.data[4 * i + c]);
+      }
+    }
+    CHECK(by_footprint > 0.05 * shown);
+    if (lens != CameraModel::kOrthographic && lens != CameraModel::kEquirectangular) {
+      // Views take the size of a pixel from where the mean is, cones from where the ray is beside
+      // it.
+      const Image tiles = draw(Traversal::kTiles, 0.5f);
+      for (std::size_t i = 0; i < tree.data.size(); ++i)
+        apart += std::abs(static_cast<double>(tree.data[i]) - tiles.data[i]);
+      CHECK(apart < 1e-2 * shown);
+      CHECK(apart < 0.1 * by_footprint);
+    }
+    TraceOptions options = peak_order();
+    options.view_footprint = 0.5f;
+    const auto prepared = reference::prepare(parameters, options);
+    std::size_t compared = 0, wrong = 0;
+    for (std::size_t i = 0; i < tree.pixels(); ++i) {
+      const auto width = static_cast<std::size_t>(camera.width);
+      const CameraRay ray = camera_ray(camera, static_cast<double>(i % width) + 0.5,
+                                       static_cast<double>(i / width) + 0.5);
+      if (!ray.valid) continue;
+      const reference::RayTrace expected = reference::trace_ray(
+          parameters, prepared, options, ray.origin, ray.direction, 0.0, 1e30,
+          lens == CameraModel::kOrthographic ? reference::ColorMode::kAlongRay
+                                             : reference::ColorMode::kFromOrigin,
+          reference::pixel_cone(camera, options, ray.direction));
+      if (expected.margin < 1e-4) continue;
+      ++compared;
+      double worst = std::abs(static_cast<double>(tree.data[4 * i + 3]) - expected.alpha);
+      for (int c = 0; c < 3; ++c) {
+        const std::size_t at = 4 * i + static_cast<std::size_t>(c);
+        worst = std::max(worst, std::abs(static_cast<double>(tree.data[at]) - expected.color[c]));
+      }
+      wrong += worst < 2e-3 ? 0 : 1;
+    }
+    CHECK(wrong == 0);
+    CHECK(2 * compared > tree.pixels());
+  }
+}
+
+TEST_CASE("a picture by rays that is differentiated has no footprint, and those after it have") {
+  Context context = make_test_context();
+  Gaussians model = reference::random_scene(200, 49, 1);
+  for (float& scale : model.log_scales) scale -= 2.0f;
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  const Camera camera = view_of(CameraModel::kPinhole, 24, 18, 20);
+  const std::vector<float> gradient = random_image_gradient(pixel_count(camera), 7);
+  TraceOptions options = peak_order();
+  options.traversal = Traversal::kBvh;
+  ViewTracer tracer(context, options);
+  options.view_footprint = 0;
+  ViewTracer bare(context, options);
+  tracer.forward(gaussians, camera);
+  const Image shown = tracer.download_image();
+  const Traced a = trace_and_differentiate(context, tracer, gaussians, camera, gradient);
+  const Traced b = trace_and_differentiate(context, bare, gaussians, camera, gradient);
+  CHECK(a.image.data == b.image.data);
+  CHECK(a.image.data != shown.data);
+  CHECK_ERRORS(errors_of(a.gradients, b.gradients), 1e-6);
+  tracer.forward(gaussians, camera);
+  CHECK(tracer.download_image().data == shown.data);
 }

@@ -526,3 +526,15 @@ TEST_CASE("no Gaussians and no rays have no gradients") {
   for (const float value : out.means.download()) CHECK(value == 0.0f);
   for (const float value : out.screen.download()) CHECK(value == 0.0f);
 }
+
+TEST_CASE("no gradients are taken of rays that may be cones [tiny]") {
+  Context context = make_test_context();
+  TraceOptions options;
+  options.view_footprint = 0.3f;
+  RayTracer tracer(context, options);
+  const DeviceGaussians gaussians =
+      DeviceGaussians::upload(context, reference::random_scene(3, 1, 0), ScaleActivation::kExp);
+  tracer.update(gaussians);
+  RayBackward backward(context, tracer);
+  CHECK_THROWS_AS(backward.begin(gaussians), UsageError);
+}

@@ -32,18 +32,23 @@ void check_results(const Gaussians& model,
                    const TraceOptions& options,
                    const std::vector<Ray>& rays,
                    ColorDirection direction,
-                   const std::vector<RayResult>& results) {
+                   const std::vector<RayResult>& results,
+                   const std::vector<RsCone>& cones = {}) {
   const reference::Parameters parameters(model);
   REQUIRE(results.size() == rays.size());
   double mean = 0;
   std::size_t ties = 0;
+  const auto prepared = reference::prepare(parameters, options);
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const Ray& r = rays[i];
+    reference::Cone cone;
+    if (!cones.empty()) cone = {cones[i].width, cones[i].spread};
     const reference::RayTrace expected =
-        reference::trace_ray(parameters, options, {r.origin[0], r.origin[1], r.origin[2]},
+        reference::trace_ray(parameters, prepared, options, {r.origin[0], r.origin[1], r.origin[2]},
                              {r.direction[0], r.direction[1], r.direction[2]}, r.t_min, r.t_max,
                              direction == ColorDirection::kRay ? reference::ColorMode::kAlongRay
-                                                               : reference::ColorMode::kFromOrigin);
+                                                               : reference::ColorMode::kFromOrigin,
+                             cone);
     for (int c = 0; c < 3; ++c) {
       mean += std::abs(results[i].color[c] - expected.color[c]) /
               (3.0 * static_cast<double>(rays.size()));
@@ -77,7 +82,85 @@ void check_rays(Context& context,
   check_results(model, options, rays, direction, tracer.trace(gaussians, rays, direction));
 }
 
+// Rays as wide as the Gaussians of `model`, wider, and not at all.
+void check_cones(Context& context,
+                 const Gaussians& model,
+                 TraceOptions options,
+                 ColorDirection direction,
+                 std::size_t count,
+                 const TreeForm& form) {
+  options.view_footprint = 0.3f;
+  std::vector<Ray> rays = axis_rays(count, 4);
+  std::vector<RsCone> cones;
+  CounterRng rng(4, 6);
+  for (std::size_t i = 0; i < count; ++i) {
+    float* d = rays[i].direction;
+    const float length = std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    for (int k = 0; k < 3; ++k) d[k] /= length;
+    const auto some = [&] { return static_cast<float>(0.1 * std::exp(rng.normal())); };
+    cones.push_back({i % 3 == 0 ? 0.0f : some(), i % 3 == 1 ? 0.0f : some()});
+    if (i % 11 == 0) cones.back() = {0.0f, 0.0f};
+  }
+  const DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+  RayTracer tracer(context, options, form);
+  tracer.update(gaussians);
+  Buffer<Ray> device_rays(context, count, "rays");
+  Buffer<RsCone> device_cones(context, count, "cones");
+  Buffer<RayResult> results(context, count, "results");
+  device_rays.upload(rays);
+  device_cones.upload(cones);
+  tracer.trace(gaussians, device_rays, count, results, direction, &device_cones);
+  const std::vector<RayResult> seen = results.download();
+  check_results(model, options, rays, direction, seen, cones);
+  // Without cones the same tree shows Gaussians as they are.
+  const std::vector<RayResult> bare = tracer.trace(gaussians, rays, direction);
+  check_results(model, options, rays, direction, bare);
+  std::size_t unlike = 0;
+  for (std::size_t i = 0; i < count; ++i) unlike += seen[i].alpha != bare[i].alpha ? 1 : 0;
+  CHECK(5 * unlike > count);
+}
+
 }  // namespace
+
+TEST_CASE("cones equal the double reference, in every tree") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(400, 37, 2);
+  for (const TreeForm& form : test::kTreeForms) {
+    for (const HitOrder order : {HitOrder::kEntry, HitOrder::kPeak}) {
+      for (const ColorDirection direction : {ColorDirection::kRay, ColorDirection::kFromOrigin}) {
+        CAPTURE(form);
+        CAPTURE(static_cast<int>(order));
+        TraceOptions options;
+        options.hit_order = order;
+        options.adaptive_radius = (order == HitOrder::kPeak) == (direction == ColorDirection::kRay);
+        check_cones(context, model, options, direction, 200, form);
+      }
+    }
+  }
+}
+
+TEST_CASE("a few cones equal the double reference [tiny]") {
+  Context context = make_test_context();
+  check_cones(context, reference::random_scene(40, 38, 1), peak_order(), ColorDirection::kRay, 24,
+              tree_form(test_device()));
+}
+
+TEST_CASE("cones are refused without a footprint, and where they are too few") {
+  Context context = make_test_context();
+  const DeviceGaussians gaussians =
+      DeviceGaussians::upload(context, reference::random_scene(3, 1, 0), ScaleActivation::kExp);
+  TraceOptions options;
+  const Buffer<Ray> rays(context, 2, "rays");
+  const Buffer<RsCone> cones(context, 1, "cones");
+  Buffer<RayResult> results;
+  for (const float footprint : {0.0f, 0.3f}) {
+    options.view_footprint = footprint;
+    RayTracer tracer(context, options);
+    tracer.update(gaussians);
+    CHECK_THROWS_AS(tracer.trace(gaussians, rays, 2, results, ColorDirection::kRay, &cones),
+                    UsageError);
+  }
+}
 
 TEST_CASE("arbitrary rays equal the double reference [small]") {
   Context context = make_test_context();

@@ -36,10 +36,12 @@ struct Fixture {
 }  // namespace
 
 TEST_CASE("ray tree: a sound tree has no fault, built or refitted") {
-  for (const bool adaptive : {false, true}) {
+  for (const auto& [adaptive, footprint] :
+       {std::pair(false, 0.0f), std::pair(true, 0.0f), std::pair(true, 0.3f)}) {
     for (const TreeForm& form : test::kTreeForms) {
       Fixture f;
       f.options.adaptive_radius = adaptive;
+      f.options.view_footprint = footprint;
       f.model.opacities[7] = -9;  // below 1/255
       RayTree tree(f.context, f.options, form);
       tree.build(f.uploaded());

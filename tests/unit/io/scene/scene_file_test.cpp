@@ -199,6 +199,7 @@ min-transmittance = 0.001
 max-hits = 100
 hit-order = "peak"
 adaptive-radius = true
+view-footprint = 0.25
 background = [1, 1, 0.5]
 packet-width = 8
 memory-budget = 64
@@ -233,6 +234,7 @@ frames = 24
   CHECK(trace.max_hits == 100);
   CHECK(trace.hit_order == HitOrder::kPeak);
   CHECK(trace.adaptive_radius);
+  CHECK(trace.view_footprint == 0.25f);
   CHECK(trace.background == std::array<float, 3>{1, 1, 0.5f});
   CHECK(trace.packet_width == 8);
   CHECK(trace.memory_budget == std::size_t{64} << 20);
@@ -242,8 +244,10 @@ frames = 24
   TraceOptions trained;
   trained.hit_order = HitOrder::kPeak;
   trained.max_hits = 33;
+  trained.view_footprint = 0.4f;
   const SceneFile plain = folder.read(kModel + "[trace]\nquantile = 8\n");
   CHECK(plain.trace.over(trained).max_hits == 33);
+  CHECK(plain.trace.over(trained).view_footprint == 0.4f);
   CHECK(plain.trace.over(trained).hit_order == HitOrder::kPeak);
   CHECK(plain.trace.over(trained).quantile == 8.0f);
   CHECK_FALSE(plain.frames.has_value());
