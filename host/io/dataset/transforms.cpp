@@ -274,20 +274,26 @@ std::optional<std::vector<std::string>> read_names(const Scope& scope, const cha
   return names;
 }
 
-/// Appends lists of frames to those of a file.
+/// Appends lists of frames to those of a file, but those that ScanNet++ marks as bad.
 struct FrameReader {
   const TransformsFrame& common;
   const glm::dvec3 signs;
   TransformsFile& file;
   std::size_t scaled = 0;
+  std::size_t bad = 0;
 
   /// `what`: "frame", as errors name one with its place in the list. Returns the paths of the
   /// photos.
   std::vector<std::string> read(const json& list, const char* what) {
     std::vector<std::string> names;
+    std::size_t place = 0;
     for (const json& object : list) {
-      const Scope scope{object, file.path, fmt::format("{} {}", what, names.size())};
+      const Scope scope{object, file.path, fmt::format("{} {}", what, place++)};
       if (!object.is_object()) scope.fail("it is no JSON object");
+      if (scope.flag("is_bad")) {
+        ++bad;
+        continue;
+      }
       TransformsFrame frame = common;
       frame.number = file.frames.size();
       read_own_intrinsics(scope, frame);
@@ -347,6 +353,12 @@ TransformsFile parse_transforms(const json& root, const fs::path& path) {
   FrameReader reader{common, axis_signs(scope), file};
   reader.read(*frames, "frame");
   read_test_frames(scope, reader);
+  if (reader.bad > 0 && file.frames.empty())
+    scope.fail("every frame is marked as 'is_bad': remove the marks of those to use");
+  if (reader.bad > 0) {
+    spdlog::info("{} of {} frames of {} are marked as 'is_bad' and left out", reader.bad,
+                 reader.bad + file.frames.size(), path.string());
+  }
   if (reader.scaled > 0) {
     spdlog::info("{} of {} cameras of {} are scaled, which does not change what they see",
                  reader.scaled, file.frames.size(), path.string());

@@ -42,10 +42,11 @@ struct TransformsFile {
 
 /// Numbers may be texts ("500"), matrices of 3 x 4, 4 x 4 or as many numbers in one list. Cameras
 /// of NeuS2 (from_na) and Mitsuba (normal_mts_args) have axes of their own, which an info says.
-/// Frames of test_frames (ScanNet++) count as those of test_filenames where the file has no lists.
-/// Throws DataError for malformed JSON, camera models other than those of model_names()
-/// (instant-ngp: is_fisheye), k5 and k6 that are not 0, and matrices that are not finite or, but
-/// for the lengths of their axes, no rigid motion to 1e-3; smaller deviations are orthonormalised.
+/// Frames of test_frames (ScanNet++) count as those of test_filenames where the file has no lists;
+/// those that are marked as is_bad are left out, which an info says. Throws DataError for malformed
+/// JSON, camera models other than those of model_names() (instant-ngp: is_fisheye), k5 and k6 that
+/// are not 0, and matrices that are not finite or, but for the lengths of their axes, no rigid
+/// motion to 1e-3; smaller deviations are orthonormalised.
 TransformsFile read_transforms(const std::filesystem::path& path);
 /// The same of what is in memory; `path` names it in errors, and files lie beside it.
 TransformsFile parse_transforms(const nlohmann::json& root, const std::filesystem::path& path);

@@ -98,6 +98,22 @@ TEST_CASE(
       test + "], ");
   REQUIRE(named.views.size() == 3);
   CHECK(named.indices(Split::kTest) == std::vector<std::size_t>{0});
+  const auto marked = [](const std::string& frames, const char* value) {
+    return "{\"is_bad\": " + std::string(value) + ", " + frames.substr(1);
+  };
+  {
+    const LogCapture log;
+    const std::string all = train;
+    train = marked(all, "true");
+    const Dataset rest = loaded("\"test_frames\": [" + marked(test, "false") + "], ");
+    REQUIRE(rest.views.size() == 5);
+    CHECK(rest.views[0].camera.name == "f1.png");
+    CHECK(rest.indices(Split::kTest) == std::vector<std::size_t>{3, 4});
+    CHECK(log.contains("1 of 6 frames of"));
+    train = marked(frame("f0.png", 0), "1");
+    CHECK(contains(data_error([&] { loaded(""); }), "every frame is marked as 'is_bad'"));
+    train = all;
+  }
   CHECK(contains(data_error([&] { loaded("\"test_frames\": 3, "); }), "'test_frames' is no list"));
   CHECK(contains(data_error([&] { loaded("\"test_frames\": [{\"file_path\": \"f4.png\"}], "); }),
                  "test frame 0: the transform_matrix is missing"));
