@@ -16,7 +16,7 @@ namespace {
 // The memory of a caller's buffer as one of ours, checked.
 cl::Buffer checked_memory(Context& context, cl_mem memory, std::size_t bytes, const char* what) {
   if (memory == nullptr) throw UsageError(fmt::format("The buffer of {} is missing", what));
-  const cl::Buffer buffer(memory, true);
+  cl::Buffer buffer(memory, true);
   if (buffer.getInfo<CL_MEM_CONTEXT>()() != context.impl().context()) {
     throw UsageError(fmt::format(
         "The buffer of {} belongs to another cl_context than the queue: make it with that of the "

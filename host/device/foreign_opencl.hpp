@@ -8,8 +8,8 @@
 #include "device/context.hpp"
 
 // Names as the OpenCL headers have them.
-typedef struct _cl_command_queue* cl_command_queue;
-typedef struct _cl_mem* cl_mem;
+typedef struct _cl_command_queue* cl_command_queue;  // NOLINT(bugprone-reserved-identifier)
+typedef struct _cl_mem* cl_mem;                      // NOLINT(bugprone-reserved-identifier)
 
 namespace raysplats {
 

@@ -13,8 +13,8 @@
 #include "raysplats/tracer.hpp"
 
 // The names of the OpenCL headers, which whoever has a queue has included.
-typedef struct _cl_command_queue* cl_command_queue;
-typedef struct _cl_mem* cl_mem;
+typedef struct _cl_command_queue* cl_command_queue;  // NOLINT(bugprone-reserved-identifier)
+typedef struct _cl_mem* cl_mem;                      // NOLINT(bugprone-reserved-identifier)
 
 namespace raysplats {
 
