@@ -334,9 +334,9 @@ LightRender render_light(const Scene& source, const Camera& camera) {
   for (int row = 0; row < camera.height; ++row) {
     for (int column = 0; column < camera.width; ++column) {
       const std::size_t pixel = out.margin.size();
-      const glm::dvec3 direction = glm::normalize(to_world * pixel_direction(camera, column, row));
-      const LightPath path = trace_light(scene, camera.center(), direction, true,
-                                         pixel_cone(camera, scene.options, direction));
+      const glm::dvec3 direction = to_world * pixel_direction(camera, column, row);
+      const Cone cone = pixel_cone(camera, scene.options, glm::normalize(direction));
+      const LightPath path = trace_light(scene, camera.center(), direction, true, cone);
       for (int c = 0; c < 3; ++c) {
         out.image[static_cast<std::size_t>(c) * pixels + pixel] = path.color[c];
       }
