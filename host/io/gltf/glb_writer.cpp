@@ -158,7 +158,7 @@ void write_glb(const std::filesystem::path& path, const Gaussians& model) {
   glb.add(kSplattingOpacity, 1, [&](std::size_t i, std::size_t) {
     return static_cast<float>(opacity_of(turned.opacities[i]));
   });
-  const auto stride = static_cast<std::size_t>(3 * sh_coefficients(turned.sh_degree));
+  const std::size_t stride = 3 * static_cast<std::size_t>(sh_coefficients(turned.sh_degree));
   std::size_t coefficient = 0;
   for (int degree = 0; degree <= turned.sh_degree; ++degree) {
     for (int n = 0; n <= 2 * degree; ++n, ++coefficient) {

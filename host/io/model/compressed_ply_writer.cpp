@@ -27,7 +27,7 @@ using Numbers = std::array<double, 9>;
 
 /// What is stored within the ranges of a chunk.
 Numbers ranged(const Gaussians& model, std::size_t i) {
-  const std::size_t sh = static_cast<std::size_t>(3 * sh_coefficients(model.sh_degree));
+  const std::size_t sh = 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree));
   Numbers out{};
   for (std::size_t k = 0; k < 3; ++k) {
     out[k] = static_cast<double>(model.means[3 * i + k]);

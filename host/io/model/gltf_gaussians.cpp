@@ -120,7 +120,7 @@ Gaussians read_primitive(const GltfReader& reader,
     }
     model.opacities[i] = logit_of(static_cast<double>(opacities[i]));
   }
-  const auto stride = static_cast<std::size_t>(3 * sh_coefficients(model.sh_degree));
+  const std::size_t stride = 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree));
   std::size_t coefficient = 0;
   for (int degree = 0; degree <= model.sh_degree; ++degree) {
     for (int n = 0; n <= 2 * degree; ++n, ++coefficient) {

@@ -114,7 +114,7 @@ Json add_rotations(const Gaussians& model, NamedFiles& files) {
 }
 
 Json add_colors(const Gaussians& model, NamedFiles& files) {
-  const auto stride = static_cast<std::size_t>(3 * sh_coefficients(model.sh_degree));
+  const std::size_t stride = 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree));
   std::vector<float> colors;
   for (std::size_t i = 0; i < model.size(); ++i) {
     for (std::size_t k = 0; k < 3; ++k) colors.push_back(model.sh[stride * i + k]);

@@ -66,7 +66,7 @@ Gaussians read_splat(const std::filesystem::path& path, bool drop_nonfinite) {
 }
 
 void write_splat(const std::filesystem::path& path, const Gaussians& model) {
-  const auto stride = static_cast<std::size_t>(3 * sh_coefficients(model.sh_degree));
+  const std::size_t stride = 3 * static_cast<std::size_t>(sh_coefficients(model.sh_degree));
   std::vector<double> weights(model.size());
   for (std::size_t i = 0; i < model.size(); ++i) {
     const float* s = &model.log_scales[3 * i];
