@@ -185,12 +185,27 @@ RayTrace trace_ray(const Parameters& parameters,
   return out;
 }
 
-Cone pixel_cone(const Camera& camera, const TraceOptions& options, const glm::dvec3& direction) {
+namespace {
+
+/// The footprint of a camera's pixels at a place in its axes.
+double footprint_at(const Camera& camera, const TraceOptions& options, const glm::dvec3& place) {
   const double pixel = static_cast<double>(options.view_footprint) * pixel_spacing(camera);
-  if (camera.model == CameraModel::kOrthographic) return {pixel, 0.0};
-  const bool around =
-      camera.model == CameraModel::kFisheye || camera.model == CameraModel::kEquirectangular;
-  return {0.0, pixel * (around ? 1.0 : (camera.rotation * direction).z)};
+  switch (camera.model) {
+    case CameraModel::kOrthographic:
+      return pixel;
+    case CameraModel::kFisheye:
+    case CameraModel::kEquirectangular:
+      return pixel * glm::length(place);
+    default:
+      return pixel * place.z;
+  }
+}
+
+}  // namespace
+
+Cone pixel_cone(const Camera& camera, const TraceOptions& options, const glm::dvec3& direction) {
+  const double width = footprint_at(camera, options, camera.rotation * direction);
+  return camera.model == CameraModel::kOrthographic ? Cone{width, 0.0} : Cone{0.0, width};
 }
 
 glm::dvec3 pixel_direction(const Camera& camera, int column, int row) {
@@ -207,12 +222,9 @@ std::vector<PreparedGaussian> prepare_view(const Parameters& parameters,
     }
   }
   if (options.view_footprint > 0.0f && camera.model != CameraModel::kOrthographic) {
-    const bool around =
-        camera.model == CameraModel::kFisheye || camera.model == CameraModel::kEquirectangular;
-    const double pixel = static_cast<double>(options.view_footprint) * pixel_spacing(camera);
     for (std::size_t i = 0; i < out.size(); ++i) {
-      const glm::dvec3 offset = camera.rotation * out[i].mean + camera.translation;
-      const double least = pixel * (around ? glm::length(offset) : offset.z);
+      const double least =
+          footprint_at(camera, options, camera.rotation * out[i].mean + camera.translation);
       if (least > 0.0)
         raise_axes(parameters, options, i, least, out[i].mean - camera.center(), out[i]);
     }

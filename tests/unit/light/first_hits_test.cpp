@@ -101,7 +101,7 @@ TEST_CASE("without surfaces first hits are the depths, normals and hits of the m
     scene.trace.view_footprint = footprint;
     TraceOptions options = scene.trace;
     options.depth = true;
-    // Packets show what is wider than a ray's neighbours a little otherwise.
+    // First hits are of cones, with which packets agree to first order alone.
     if (footprint > 0) options.traversal = Traversal::kBvh;
     Tracer plain(context, options);
     PathTracer tracer(context, scene);

@@ -199,12 +199,7 @@ TEST_CASE("mirrors show the footprint of a view, in any batches [small]") {
     if (expected.margin < 1e-4) continue;
     ++compared;
     reflected += std::count(expected.hits.begin(), expected.hits.end(), 0xffffffffu) > 1 ? 1 : 0;
-    double worst = std::abs(static_cast<double>(image.data[4 * i + 3]) - expected.alpha);
-    for (int c = 0; c < 3; ++c) {
-      const std::size_t at = 4 * i + static_cast<std::size_t>(c);
-      worst = std::max(worst, std::abs(static_cast<double>(image.data[at]) - expected.color[c]));
-    }
-    wrong += worst < 2e-3 ? 0 : 1;
+    wrong += pixel_error(image, i, expected.color, expected.alpha) < 2e-3 ? 0 : 1;
   }
   CHECK(wrong == 0);
   CHECK(compared > 500);

@@ -171,12 +171,7 @@ TEST_CASE("every traversal shows the footprint of a view, through every lens") {
           reference::pixel_cone(camera, options, ray.direction));
       if (expected.margin < 1e-4) continue;
       ++compared;
-      double worst = std::abs(static_cast<double>(tree.data[4 * i + 3]) - expected.alpha);
-      for (int c = 0; c < 3; ++c) {
-        const std::size_t at = 4 * i + static_cast<std::size_t>(c);
-        worst = std::max(worst, std::abs(static_cast<double>(tree.data[at]) - expected.color[c]));
-      }
-      wrong += worst < 2e-3 ? 0 : 1;
+      wrong += pixel_error(tree, i, expected.color, expected.alpha) < 2e-3 ? 0 : 1;
     }
     CHECK(wrong == 0);
     CHECK(2 * compared > tree.pixels());

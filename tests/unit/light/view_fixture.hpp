@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <glm/vec3.hpp>
 #include <vector>
 
@@ -74,6 +76,19 @@ inline Camera view_of(CameraModel model, int width, int height, double focal) {
   Camera camera = look_at({0.4, -0.3, -2.6}, {0, 0, 0}, {0, -1, 0}, width, height, focal);
   camera.model = model;
   return camera;
+}
+
+/// How far pixel i of a picture is from a colour and a coverage, at most of its four channels.
+inline double pixel_error(const Image& image,
+                          std::size_t i,
+                          const glm::dvec3& color,
+                          double alpha) {
+  double worst = std::abs(static_cast<double>(image.data[4 * i + 3]) - alpha);
+  for (int c = 0; c < 3; ++c) {
+    const std::size_t at = 4 * i + static_cast<std::size_t>(c);
+    worst = std::max(worst, std::abs(static_cast<double>(image.data[at]) - color[c]));
+  }
+  return worst;
 }
 
 }  // namespace raysplats

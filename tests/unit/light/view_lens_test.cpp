@@ -119,12 +119,7 @@ TEST_CASE("pictures of other cameras equal the double reference, by packets or r
         if (expected.margin < 1e-4) continue;
         ++compared;
         hit += expected.hits.empty() ? 0 : 1;
-        double worst = std::abs(static_cast<double>(image.data[4 * i + 3]) - expected.alpha);
-        for (int c = 0; c < 3; ++c) {
-          worst = std::max(
-              worst, std::abs(static_cast<double>(image.data[4 * i + static_cast<std::size_t>(c)]) -
-                              expected.color[c]));
-        }
+        const double worst = pixel_error(image, i, expected.color, expected.alpha);
         const double along =
             camera.model == CameraModel::kOpenCv ? glm::dot(axis, ray.direction) : 1.0;
         const double far = along * expected.expected_depth;
