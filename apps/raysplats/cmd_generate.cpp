@@ -50,6 +50,7 @@ Command add_generate_command(CLI::App& app) {
       ->check(not_empty())
       ->type_name("");
   std::vector<std::string> names;
+  names.reserve(kScenes.size());
   for (const auto& [name, scene] : kScenes) names.emplace_back(name);
   command
       ->add_option("--scene", options->scene,

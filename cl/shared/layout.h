@@ -15,7 +15,7 @@ typedef struct {
 RS_STATIC_ASSERT_SIZE(RsAabb, 24);
 
 // What one view needs of one Gaussian, one cache line (docs/model.md, "The camera line").
-// Projective form: x0 y0 m_z p | q r D0 e_x | e_y C00 C01 C11 | opacity r g b.
+// Projective form: x0 y0 m_z p | q r e_x e_y | kappa, three of no meaning | opacity r g b.
 // General form: whitening matrix in camera axes, rows M0 M1 M2 (9), whitened origin o' (3), opacity
 // r g b.
 typedef struct {

@@ -7,8 +7,7 @@
 #include "trace/line_sum.h"
 #include "trace/packet.h"
 
-// Depth has a gradient too. The depth of a hit is that of its greatest response, and so depends on
-// m_z; its gradient takes the slot of D0, whose own follows from the others (view_gradient.h).
+// Depth has a gradient too: that of a hit is the depth of its greatest response.
 #ifndef DEPTH_GRADIENT
 #define DEPTH_GRADIENT 0
 #endif

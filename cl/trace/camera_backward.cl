@@ -16,9 +16,9 @@
 //                     global size: packets of the band
 // With DEPTH_GRADIENT depth_gradient is that of the sum of T alpha t of every pixel, t being the
 // depth of a hit; else it is not read.
-// Components of a line's gradient follow the line; slot 2 (m_z, of which order makes no gradient)
-// sums the per-ray lengths of the screen gradient instead, the densification signal of AbsGS (Ye et
-// al. 2024).
+// Components of a line's gradient follow the line; slot 2 sums the per-ray lengths of the screen
+// gradient, the densification signal of AbsGS (Ye et al. 2024), in place of that of m_z, which only
+// depths have a gradient of: it is in slot 9.
 #include "parallel/prefetch.h"
 #include "trace/arguments.h"
 #include "trace/hit_stream.h"
@@ -82,7 +82,14 @@ void add_gradient(const Pixels* p,
                   const LineSums* sums) {
   fv g[16];
   line_gradient(p, reference & 1, lines[reference >> 1].v, g_alpha, alpha, weight, g);
-  rs_add_line(sums, reference >> 1, sum_lanes(g));
+  const float16 sum = sum_lanes(g);
+#if PRIVATE_COPIES
+  rs_add_line(sums, reference >> 1, sum);
+#else
+  rs_add_numbers(sums, reference >> 1, sum, 0, RS_PROJECTIVE_END);
+  if (reference & 1) rs_add_numbers(sums, reference >> 1, sum, RS_PROJECTIVE_END, 12);
+  rs_add_numbers(sums, reference >> 1, sum, 12, 16);
+#endif
 }
 
 // The oldest open row has met all rows that it may change places with: its gradient is complete.

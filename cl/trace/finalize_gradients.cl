@@ -101,14 +101,8 @@ __kernel void finalize_gradients(RS_FINALIZE_ARGUMENTS) {
   fv line[16];
   load_columns(lines[i].v, 16, 16, line);
   ViewGradient view;
-#if DEPTH_GRADIENT
-  const fv depth = take_depth_gradient(line, touched, kind, v);
-#endif
   take_shape_gradient(line, kind, v);
   view_gradient(&g, v, touched, kind, &view);
-#if DEPTH_GRADIENT
-  view.m[2] += depth;
-#endif
 #if VIEW_FOOTPRINT
   FootprintGradient rest;
   axis_footprint_gradient(&g, v[12], &view, &rest);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // trace_backward_group: what trace_backward does, with a packet per work-group (group.h) and the
-// streams that trace_forward_group kept. The 16 components of a line's gradient are summed over the
+// streams that trace_forward_group kept. The components of a line's gradient are summed over the
 // rays through local memory, or by the subgroup; one work-item adds one of them to the sums.
 //   PRIVATE_COPIES 1: work-group g of `copies` takes every copies-th tile and adds to its own copy.
 //   otherwise:        a work-group per packet of the band.
@@ -52,24 +52,32 @@ typedef struct {
   float before, from_here;
 } ClosedHit;
 
-// Adds the sums of g over the group to line `line`.
+// Whether lines of a form have number k of a gradient.
+bool has_number(const bool general, const int k) {
+  return general || k < RS_PROJECTIVE_END || k >= 12;
+}
+
+// Adds the sums of g over the group to the line of `reference`.
 RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
                                     const int lane,
                                     const LineSums* sums,
-                                    const uint line,
+                                    const uint reference,
                                     const float* g) {
+  const bool general = reference & 1;
+  const size_t first = (size_t)(reference >> 1) * 16;
 #if SUBGROUP
   (void)memory;
   float mine[RS_SUM_EACH];
 #pragma unroll
   for (int k = 0; k < 16; ++k) {
+    if (!has_number(general, k)) continue;
     const float sum = sub_group_reduce_add(g[k]);
     if (lane == k % GROUP) mine[k / GROUP] = sum;
   }
 #pragma unroll
   for (int i = 0; i < RS_SUM_EACH; ++i) {
     const int k = lane + i * GROUP;
-    if (k < 16) rs_add_sum(sums, (size_t)line * 16 + k, mine[i]);
+    if (k < 16 && has_number(general, k)) rs_add_sum(sums, first + k, mine[i]);
   }
 #else
 #pragma unroll
@@ -86,9 +94,10 @@ RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
     rs_group_barrier();
   }
   for (int k = lane; k < 16; k += GROUP) {
+    if (!has_number(general, k)) continue;
     float sum = memory->sum[0][k];
     for (int j = 1; j < RS_SUM_PARTS; ++j) sum += memory->sum[j][k];
-    rs_add_sum(sums, (size_t)line * 16 + k, sum);
+    rs_add_sum(sums, first + k, sum);
   }
 #endif
 }
@@ -125,7 +134,7 @@ RS_GROUP_INLINE void close_row(__local BackwardMemory* memory,
   const float g_alpha = before > 0.0f ? before * projected - behind : 0.0f;
   float g[16];
   line_gradient(p, reference & 1, v, g_alpha, alpha, before * alpha, g);
-  group_add_line(memory, lane, &scene.sums, reference >> 1, g);
+  group_add_line(memory, lane, &scene.sums, reference, g);
 }
 
 // `works`: whether there is a packet at (group_x, group_y); otherwise nothing happens.

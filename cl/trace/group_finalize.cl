@@ -192,11 +192,8 @@ RS_FINALIZE_WAVE __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel voi
   float v[16];
   for (int k = 0; k < 13; ++k) v[k] = row[k];
   // Before the Gaussian itself is read, so that less is in registers at once.
-  float line[12];
-  for (int k = 3; k < (DEPTH_GRADIENT ? 12 : 7); ++k) line[k] = lines[i].v[k];
-#if DEPTH_GRADIENT
-  const float depth = take_depth_gradient(line, touched, kind, v);
-#endif
+  float line[9];
+  for (int k = 2; k < 9; ++k) line[k] = lines[i].v[k];
   take_shape_gradient(line, kind, v);
   ViewGaussian g;
   load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
@@ -213,9 +210,6 @@ RS_FINALIZE_WAVE __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel voi
   ViewGradient view;
   park(row, &g, out.mean);
   view_gradient(&g, v, touched, kind, &view);
-#if DEPTH_GRADIENT
-  view.m[2] += depth;
-#endif
 #if VIEW_FOOTPRINT
   barrier(CLK_LOCAL_MEM_FENCE);  // as in park()
   for (int j = 0; j < 3; ++j) g.raw_scale[j] = row[3 + j];

@@ -16,6 +16,10 @@ fv rs_projected(const Pixels* p, __global const float* v, const PacketMeeting* m
 #endif
 }
 
+// Numbers RS_PROJECTIVE_END to 11 of the gradient of a projective line are 0: there is nothing to
+// add.
+#define RS_PROJECTIVE_END (DEPTH_GRADIENT ? 10 : 9)
+
 #if LENS == RS_LENS_AROUND
 // Length of a gradient with respect to the angle in which the mean at (x, y) is seen, from that
 // with respect to its tangent coordinates.
@@ -33,45 +37,40 @@ void line_gradient_projective(
   const fv inverse = 1.0f / m.direction2;
   const fv dx = p->X - v[0];
   const fv dy = p->Y - v[1];
-  const fv gN = g_distance2 * inverse;
+  const fv toward = 1.0f + v[6] * dx + v[7] * dy;
+  const fv near = toward * inverse;
+  const fv distance2 = m.numerator * inverse;
+  // N and D = toward^2 + kappa N
+  fv gN = g_distance2 * near * near;
+  fv g_toward = -2.0f * g_distance2 * near * distance2;
+  fv g_kappa = -g_distance2 * distance2 * distance2;
 #if DEPTH_GRADIENT
-  // t = m_z (D0 + E) / D with E = e . (dx, dy)
-  const fv g_depth = weight * p->gS * inverse;
-  const fv gD = -(gN * m.numerator + g_depth * m.along) * inverse;
-  const fv gE = g_depth * v[2];
+  // t = m_z toward / D
+  const fv g_near = weight * p->gS;
+  const fv through_D = g_near * v[2] * near;
+  gN -= through_D * v[8] * inverse;
+  g_toward += g_near * v[2] * inverse - 2.0f * through_D * near;
+  g_kappa -= through_D * distance2;
+  g[9] = g_near * near;
 #else
   (void)weight;
-  const fv gD = -gN * m.numerator * inverse;
 #endif
   // N is the sum of the squares of p dx + q dy and of r dy.
-  const fv gU = gN * (v[3] * dx + v[4] * dy), gV = gN * (v[5] * dy), gDx = gD * dx, gDy = gD * dy;
-  g[0] = -2.0f * (gU * v[3] + gD * v[7] + gDx * v[9] + gDy * v[10]);
-  g[1] = -2.0f * (gU * v[4] + gV * v[5] + gD * v[8] + gDx * v[10] + gDy * v[11]);
-#if DEPTH_GRADIENT
-  g[0] -= gE * v[7];
-  g[1] -= gE * v[8];
-#endif
+  const fv gU = 2.0f * gN * (v[3] * dx + v[4] * dy), gV = 2.0f * gN * (v[5] * dy);
+  g[0] = -(gU * v[3] + g_toward * v[6]);
+  g[1] = -(gU * v[4] + gV * v[5] + g_toward * v[7]);
 #if LENS == RS_LENS_AROUND
   g[2] = rs_angular_length(v[0], v[1], g[0], g[1]) * p->screen_x;
 #else
   g[2] =
       sqrt(g[0] * g[0] * (p->screen_x * p->screen_x) + g[1] * g[1] * (p->screen_y * p->screen_y));
 #endif
-  g[3] = 2.0f * gU * dx;
-  g[4] = 2.0f * gU * dy;
-  g[5] = 2.0f * gV * dy;
-#if DEPTH_GRADIENT
-  g[6] = g_depth * (v[6] + v[7] * dx + v[8] * dy);
-  g[7] = 2.0f * gDx + gE * dx;
-  g[8] = 2.0f * gDy + gE * dy;
-#else
-  g[6] = gD;
-  g[7] = 2.0f * gDx;
-  g[8] = 2.0f * gDy;
-#endif
-  g[9] = gDx * dx;
-  g[10] = 2.0f * gDx * dy;
-  g[11] = gDy * dy;
+  g[3] = gU * dx;
+  g[4] = gU * dy;
+  g[5] = gV * dy;
+  g[6] = g_toward * dx;
+  g[7] = g_toward * dy;
+  g[8] = g_kappa;
 }
 
 // g_o' = 2 g v with the residual v = o' + peak d'; g_d' = peak g_o'. The peak itself is
@@ -110,6 +109,7 @@ void line_gradient(const Pixels* p,
                    const fv weight,
                    fv* g) {
   const fv g_distance2 = -0.5f * alpha * g_alpha;
+  g[9] = g[10] = g[11] = (fv)(0.0f);
   g[12] = g_alpha * (alpha / v[12]);  // the response is alpha / opacity
   g[13] = weight * p->gR;
   g[14] = weight * p->gG;

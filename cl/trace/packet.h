@@ -117,7 +117,8 @@ bool rs_on_face(__global const RsLensTile* tiles, const int face, const uint til
 #endif
 }
 
-// How the packet's rays pass a Gaussian.
+// How the packet's rays pass a Gaussian. The last three are s^2 times what they are called, with s
+// of rs_unit2().
 typedef struct {
   iv inside;      // squared whitened distance of the line at most Q
   fv numerator;   // ||o' x d'||^2 = squared distance times <d', d'>
@@ -131,13 +132,12 @@ PacketMeeting rs_meet_projective(__global const float* v, float quantile, fv X, 
   PacketMeeting m;
   const fv dx = X - v[0];
   const fv dy = Y - v[1];
-  const fv twice_dy = 2.0f * dy;
-  const fv e = v[7] * dx + v[8] * dy;
   const fv across = v[3] * dx + v[4] * dy;
   const fv upright = v[5] * dy;
   m.numerator = across * across + upright * upright;
-  m.direction2 = v[6] + 2.0f * e + dx * (v[9] * dx + v[10] * twice_dy) + v[11] * dy * dy;
-  m.along = v[2] * (v[6] + e);
+  const fv toward = 1.0f + v[6] * dx + v[7] * dy;
+  m.direction2 = toward * toward + v[8] * m.numerator;
+  m.along = v[2] * toward;
   m.inside = RS_MASK(m.numerator <= quantile * m.direction2);
   return m;
 }
@@ -163,9 +163,15 @@ PacketMeeting rs_meet(__global const float* v, bool general, float quantile, fv 
   return general ? rs_meet_general(v, quantile, X, Y) : rs_meet_projective(v, quantile, X, Y);
 }
 
-// |o'|^2: squared whitened distance of the camera to the mean.
+// s^2: the square of the unit in which a line's numbers measure whitened space. That of the
+// projective form makes ||o'|| equal to m_z.
+float rs_unit2(__global const float* v, bool general) {
+  return general ? 1.0f : v[2] * v[2] * v[8];
+}
+
+// s^2 |o'|^2: squared distance of the camera to the mean.
 float rs_origin_distance2(__global const float* v, bool general) {
-  return general ? v[9] * v[9] + v[10] * v[10] + v[11] * v[11] : v[6] * v[2] * v[2];
+  return general ? v[9] * v[9] + v[10] * v[10] + v[11] * v[11] : v[2] * v[2];
 }
 
 #endif

@@ -154,15 +154,17 @@ __attribute__((always_inline)) static void packet_hits(const PacketState* p,
   fv far[RS_TOGETHER];
 #pragma unroll
   for (int j = 0; j < count; ++j) {
-    const fv discriminant = quantiles[j] * m[j].direction2 - m[j].numerator;
+    const float unit2 = rs_unit2(lines[references[j] >> 1].v, general);
+    const fv discriminant = unit2 * (quantiles[j] * m[j].direction2 - m[j].numerator);
     far[j] = m[j].along + sqrt(discriminant > 0.0f ? discriminant : (fv)(0.0f));
   }
 #pragma unroll
   for (int j = 0; j < count; ++j) inverse[j] = 1.0f / m[j].direction2;
 #pragma unroll
   for (int j = 0; j < count; ++j) {
-    const float origin2 = rs_origin_distance2(lines[references[j] >> 1].v, general);
-    hits[j].key = (origin2 - quantiles[j]) / far[j];
+    __global const float* v = lines[references[j] >> 1].v;
+    const float origin2 = rs_origin_distance2(v, general);
+    hits[j].key = (origin2 - rs_unit2(v, general) * quantiles[j]) / far[j];
     hits[j].hit = m[j].inside & among & RS_MASK(hits[j].key >= 0.0f) & RS_MASK(far[j] > 0.0f);
   }
 #endif

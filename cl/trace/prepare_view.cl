@@ -19,7 +19,7 @@
 void write_projective(const ViewGaussian* g, fv* v) {
   const fv mx = g->m[0], my = g->m[1], mz = g->m[2];
   const fv iz = 1.0f / mz;
-  fv a = 0, b = 0, d0 = 0, ex = 0, ey = 0, c00 = 0, c01 = 0, c11 = 0;
+  fv a = 0, b = 0, origin2 = 0, ex = 0, ey = 0;
   for (int k = 0; k < 3; ++k) {
     const fv rx = g->axis[3 * k], ry = g->axis[3 * k + 1], rz = g->axis[3 * k + 2];
     // o' x M_j by the cofactor identity (Ma) x (Mb) = det(M) M^-T (a x b): no cancellation.
@@ -30,27 +30,23 @@ void write_projective(const ViewGaussian* g, fv* v) {
     b += A * B;
     const fv w = g->w[k];
     const fv q = (rx * mx + ry * my + rz * mz) * w;
-    d0 += q * q;
+    origin2 += q * q;
     ex += q * rx * w;
     ey += q * ry * w;
-    c00 += rx * rx * w * w;
-    c01 += rx * ry * w * w;
-    c11 += ry * ry * w * w;
   }
   v[0] = mx * iz;
   v[1] = my * iz;
   v[2] = mz;
   // p, q and r. q / p is the slope of a needle: no rounding of the root gets into it.
-  const fv p = sqrt(a);
-  v[3] = p;
-  v[4] = b / a * p;
-  v[5] = sqrt(d0) * g->w[0] * (g->w[1] * g->w[2] * mz / p);
-  v[6] = d0 * iz * iz;
-  v[7] = ex * iz;
-  v[8] = ey * iz;
-  v[9] = c00;
-  v[10] = c01;
-  v[11] = c11;
+  const fv kappa = 1.0f / origin2;
+  const fv across = sqrt(a);
+  v[3] = mz * sqrt(kappa) * across;
+  v[4] = b / a * v[3];
+  v[5] = mz * g->w[0] * (g->w[1] * g->w[2] * mz / across);
+  v[6] = mz * kappa * ex;
+  v[7] = mz * kappa * ey;
+  v[8] = kappa;
+  v[9] = v[10] = v[11] = 0;
 }
 
 // Writes the general form in place of the projective one, in the lanes where `general` holds.

@@ -2,8 +2,8 @@
 // Cones of rays (Amanatides 1984): where pixels are wider than Gaussians, a ray sees these as
 // view_footprint.h shows them to a view. Beside a mean m, at t = <d, m - o>, a cone has the width
 // f = width + spread t; axes below f are raised to it, and the opacity falls with the area of the
-// outline. The outline is seen from the cone's apex, along u = spread (m - o) + width d, whatever mirrors
-// lie between the apex and the ray's origin o. Included by ray_block.h.
+// outline. The outline is seen from the cone's apex, along u = spread (m - o) + width d, whatever
+// mirrors lie between the apex and the ray's origin o. Included by ray_block.h.
 #ifndef RS_TRACE_RAY_CONE_H
 #define RS_TRACE_RAY_CONE_H
 

@@ -256,10 +256,10 @@ iv depth_key(const fv depth, const uint first_step) {
 // What the least depth of Gaussians in a tile needs of their lines.
 typedef struct {
   fv mean_x, mean_y;
-  fv along, slope_x, slope_y;  // <o', d'> at the mean, and its slopes
-  fv most_x, most_y;           // what a slope adds at the end of the outline
-  fv limit;                    // of that product with the point of a hit
-  fv depth;                    // no hit is nearer
+  fv slope_x, slope_y;  // of <o', d'>, which is 1 at the mean
+  fv most_x, most_y;    // what a slope adds at the end of the outline
+  fv limit;             // of that product with the point of a hit
+  fv depth;             // no hit is nearer
 } DepthPlanes;
 
 // Lower bound of the depth of all hits of one Gaussian in a tile: of its own least depth, and of
@@ -269,21 +269,20 @@ typedef struct {
 void depth_planes(const fv* b, __global const RsLine* lines, DepthPlanes* planes) {
   fv v[16];
   load_columns(lines->v, 16, LANES == 1 ? 9 : 16, v);
-  const fv origin2 = v[6] * v[2] * v[2];
+  const fv relative = b[RS_BOUNDS_QUANTILE] * v[8];
 #if PEAK_ORDER
-  const fv limit = b[RS_BOUNDS_QUANTILE];
+  const fv limit = relative;
 #else
-  const fv limit = sqrt(b[RS_BOUNDS_QUANTILE] * origin2);
+  const fv limit = sqrt(relative);
 #endif
   const iv projective = rs_as_int(b[RS_BOUNDS_KIND]) == RS_LINE_PROJECTIVE;
   planes->mean_x = v[0];
   planes->mean_y = v[1];
-  planes->along = v[6];
-  planes->slope_x = v[7];
-  planes->slope_y = v[8];
-  planes->most_x = v[7] * ((v[7] > 0.0f ? b[RS_BOUNDS_X1] : b[RS_BOUNDS_X0]) - v[0]);
-  planes->most_y = v[8] * ((v[8] > 0.0f ? b[RS_BOUNDS_Y1] : b[RS_BOUNDS_Y0]) - v[1]);
-  planes->limit = projective ? (origin2 - limit) / v[2] * 0.9999f : (fv)(0.0f);
+  planes->slope_x = v[6];
+  planes->slope_y = v[7];
+  planes->most_x = v[6] * ((v[6] > 0.0f ? b[RS_BOUNDS_X1] : b[RS_BOUNDS_X0]) - v[0]);
+  planes->most_y = v[7] * ((v[7] > 0.0f ? b[RS_BOUNDS_Y1] : b[RS_BOUNDS_Y0]) - v[1]);
+  planes->limit = projective ? (1.0f - limit) * v[2] * 0.9999f : (fv)(0.0f);
   planes->depth = b[RS_BOUNDS_DEPTH];
 }
 
@@ -359,7 +358,7 @@ __kernel void fill_tiles(const uint begin,
     const fv high_x = (rs_to_float(x.v) + 1.0f) * size_x - centre_x;
     const fv high_y = (rs_to_float(y.v) + 1.0f) * size_y - centre_y;
 #endif
-    const fv along = planes.along +
+    const fv along = 1.0f +
                      most_along(planes.slope_y, low_y, high_y, planes.mean_y, planes.most_y) +
                      most_along(planes.slope_x, low_x, high_x, planes.mean_x, planes.most_x);
     const fv plane = ((along > 0.0f) & (planes.limit > 0.0f)) ? planes.limit / along : zero;

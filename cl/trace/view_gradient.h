@@ -9,7 +9,7 @@
 #include "shared/color.h"
 #include "trace/view.h"
 
-// The lines' gradients have that of m_z in the slot of D0 (line_gradient.h).
+// The lines' gradients have that of m_z too (line_gradient.h).
 #ifndef DEPTH_GRADIENT
 #define DEPTH_GRADIENT 0
 #endif
@@ -24,8 +24,6 @@ typedef struct {
 void projective_gradient(const ViewGaussian* g, const fv* v, ViewGradient* out) {
   const fv mx = g->m[0], my = g->m[1], mz = g->m[2];
   const fv iz = 1.0f / mz;
-  const fv x0 = mx * iz, y0 = my * iz;
-  fv ex = 0, ey = 0, d0 = 0;
   fv P[3], gP[3];
 #pragma unroll
   for (int k = 0; k < 3; ++k) {
@@ -45,17 +43,11 @@ void projective_gradient(const ViewGaussian* g, const fv* v, ViewGradient* out) 
     gP[k] = A * gx + B * gy;
     const fv along = rx * mx + ry * my + rz * mz;
     const fv q = along * w;
-    d0 += q * q;
-    ex += q * rx * w;
-    ey += q * ry * w;
-    const fv ge = v[7] * rx + v[8] * ry;
-    const fv gq = 2.0f * v[6] * q * iz * iz + ge * w * iz;
-    out->w[k] =
-        ge * q * iz + 2.0f * w * (v[9] * rx * rx + v[10] * rx * ry + v[11] * ry * ry) + gq * along;
-    out->axis[3 * k] =
-        v[7] * q * w * iz + w * w * (2.0f * v[9] * rx + v[10] * ry) + gq * w * mx - gB * mz;
-    out->axis[3 * k + 1] =
-        v[8] * q * w * iz + w * w * (2.0f * v[11] * ry + v[10] * rx) + gq * w * my + gA * mz;
+    const fv by_slope = v[6] * rx + v[7] * ry;
+    const fv gq = v[8] * q + by_slope * w;
+    out->w[k] = by_slope * q + gq * along;
+    out->axis[3 * k] = v[6] * q * w + gq * w * mx - gB * mz;
+    out->axis[3 * k + 1] = v[7] * q * w + gq * w * my + gA * mz;
     out->axis[3 * k + 2] = gq * w * mz - gA * my + gB * mx;
     out->m[0] += gq * w * rx + gB * rz;
     out->m[1] += gq * w * ry - gA * rz;
@@ -70,8 +62,7 @@ void projective_gradient(const ViewGaussian* g, const fv* v, ViewGradient* out) 
   }
   out->m[0] += v[0] * iz;
   out->m[1] += v[1] * iz;
-  out->m[2] -= (v[0] * x0 + v[1] * y0 - 2.0f * v[5]) * iz + 2.0f * v[6] * d0 * iz * iz * iz +
-               (v[7] * ex + v[8] * ey) * iz * iz;
+  out->m[2] += (v[9] - (v[0] * mx + v[1] * my) * iz) * iz;
 }
 
 // Writes the general gradient in place of the projective one, in the lanes where `general` holds.
@@ -104,38 +95,31 @@ void view_gradient(
   if (rs_any_of(touched & general)) general_gradient(g, v, general, out);
 }
 
-// Turns the gradients of p, q and r of a projective line, v[3..5], into twice that of a, that of b
-// (prepare_view.cl) and r dL/dr, by p = sqrt(a), q = b / p and r = sqrt(D0) det(M) m_z^2 / p. What
-// a and D0 receive through r is added to theirs here; what det(M) and m_z do, by
-// projective_gradient().
+// Turns the gradients of p, q, r, e_x, e_y, kappa and m_z of a projective line, v[3..9], into those
+// of what they are made of (prepare_view.cl), n = -o' being the whitened mean, u_x = n x M_0 and
+// u_y = n x M_1: twice that of |u_x|^2, that of <u_x, u_y>, r dL/dr, those of <n, M_0> and
+// <n, M_1>, twice that of |n|^2, and m_z dL/dm_z.
 void take_shape_gradient(const fv* line, const iv kind, fv* v) {
   const iv projective = kind == RS_LINE_PROJECTIVE;
   const fv inverse_p = 1.0f / line[3];
-  const fv by_b = v[4] * inverse_p;
-  const fv by_r = v[5] * line[5];
-  const fv by_a = (v[3] - by_b * line[4] - by_r * inverse_p) * inverse_p;
-  v[3] = projective ? by_a : v[3];
-  v[4] = projective ? by_b : v[4];
+  const fv unit = line[2] * line[8];
+  const fv by_p = v[3] * line[3], by_q = v[4] * line[4], by_r = v[5] * line[5];
+  const fv by_slopes = v[6] * line[6] + v[7] * line[7];
+  const fv per_p2 = line[2] * unit * inverse_p * inverse_p;
+  v[3] = projective ? (by_p - by_q - by_r) * per_p2 : v[3];
+  v[4] = projective ? v[4] * line[3] * per_p2 : v[4];
   v[5] = projective ? by_r : v[5];
-  v[6] = projective ? v[6] + 0.5f * by_r / line[6] : v[6];
-}
-
+  v[6] = projective ? v[6] * unit : v[6];
+  v[7] = projective ? v[7] * unit : v[7];
+  const fv by_scale = by_p + by_q;  // of m_z / |n|
+  v[8] = projective ? -(by_scale + 2.0f * (line[8] * v[8] + by_slopes)) * line[8] : v[8];
 #if DEPTH_GRADIENT
-// Takes the gradient of m_z out of that of a projective line, v[6], and puts that of D0 there: N is
-// of second degree in v[3..5], D of first in v[6..11], the squared distance is N / D and the depth
-// of degree 0, so that half the products of numbers and gradients of N and those of D add up to 0
-// (Euler).
-fv take_depth_gradient(const fv* line, const iv touched, const iv kind, fv* v) {
-  fv sum = 0;
-  for (int k = 3; k < 12; ++k) {
-    if (k != 6) sum += (k < 6 ? 0.5f : 1.0f) * line[k] * v[k];
-  }
-  const iv counts = touched & (kind == RS_LINE_PROJECTIVE);
-  const fv depth = counts ? v[6] : (fv)(0.0f);
-  v[6] = counts ? -sum / line[6] : v[6];
-  return depth;
-}
+  const fv by_depth = line[2] * v[9];
+#else
+  const fv by_depth = 0;
 #endif
+  v[9] = projective ? by_scale + by_slopes + 2.0f * by_r + by_depth : v[9];
+}
 
 // What density control reads: screen gradient, the sum of its absolute values, 1 where a ray met.
 void screen_statistics(const ViewGaussian* g,

@@ -10,8 +10,8 @@
 // 32 written. SH coefficients come on top, 12 bytes each.
 #define RS_WORK_PREPARE_BYTES 140
 // Rotation 36, axes and mean in camera axes 60, unit quaternion 12, scales and opacity 15, culling
-// 41, line 133, outline 94, direction 10.
-#define RS_WORK_PREPARE_FLOPS 401
+// 41, line 100, outline 94, direction 10.
+#define RS_WORK_PREPARE_FLOPS 368
 // One SH coefficient: three fused multiply-adds.
 #define RS_WORK_SH_FLOPS 6
 #define RS_WORK_SH_BYTES 12
@@ -30,27 +30,27 @@
 #define RS_WORK_FORWARD_CANDIDATE_BYTES 92
 // Per pixel: R, G, B, A.
 #define RS_WORK_FORWARD_PIXEL_BYTES 16
-// Per hit: offsets 2, numerator 7, denominator 15, depth 2, test 1 (27); squared distance and peak
+// Per hit: offsets 2, numerator 7, denominator 7, depth 1, test 1 (18); squared distance and peak
 // 3; response 19; blending 9.
-#define RS_WORK_FORWARD_FLOPS 58
+#define RS_WORK_FORWARD_FLOPS 49
 // Near root in entry order.
-#define RS_WORK_ENTRY_FLOPS 8
+#define RS_WORK_ENTRY_FLOPS 9
 
 // trace_backward, per Gaussian: line 64 read, its gradient 64 read and written.
 #define RS_WORK_BACKWARD_GAUSSIAN_BYTES 192
 // Per pixel: gradient of R, G, B, A and two transmittances. Streams come on top.
 #define RS_WORK_BACKWARD_PIXEL_BYTES 24
-// Per hit: geometry 28, response 19, transmittance 2, colour and suffix 12; the line's gradient:
-// geometry 28, chain 50, sum over rays 16.
-#define RS_WORK_BACKWARD_FLOPS 155
+// Per hit: geometry 19, response 19, transmittance 2, colour and suffix 12; the line's gradient:
+// geometry 19, chain 39, sum over rays 13.
+#define RS_WORK_BACKWARD_FLOPS 123
 
-// finalize_gradients, per Gaussian: line gradient 64, shape and colours of the line 28, bounds 32,
+// finalize_gradients, per Gaussian: line gradient 64, shape and colours of the line 40, bounds 32,
 // parameters 44 read; gradients 44 and statistics 12 written. SH coefficients come on top, 12 read
 // and 12 written each.
-#define RS_WORK_FINALIZE_BYTES 224
-// Parameters as in prepare_view 123, line to camera axes 241, rotation and quaternion 80, scales
+#define RS_WORK_FINALIZE_BYTES 236
+// Parameters as in prepare_view 123, line to camera axes 132, rotation and quaternion 80, scales
 // 15, opacity 3, screen statistics 10, direction 20.
-#define RS_WORK_FINALIZE_FLOPS 492
+#define RS_WORK_FINALIZE_FLOPS 383
 // One SH coefficient: its gradient 3, the colour along it 6, direction 6.
 #define RS_WORK_FINALIZE_SH_FLOPS 15
 

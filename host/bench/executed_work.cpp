@@ -54,13 +54,13 @@ KernelWork prepare_work(const ExecutedCounts& c) {
   const double further = c.sh - 1;
   const KernelWork gaussian =
       c.grouped
-          ? KernelWork{.vectors = (970 + 40 * further) / kWave,
+          ? KernelWork{.vectors = (940 + 40 * further) / kWave,
                        .scalars = (200 + 5 * further) / kWave,
                        .slow = 20 / kWave,
                        .local = (100 + 6 * further) / kWave,
                        .trips = (8 + 0.2 * further) / kWave,
                        .barriers = (8 + 0.4 * further) / kWave}
-          : KernelWork{.vectors = 57.4 + 0.6 * further, .scalars = 21, .slow = 1.4, .parked = 8.3};
+          : KernelWork{.vectors = 55.5 + 0.6 * further, .scalars = 21, .slow = 1.4, .parked = 8.3};
   const double bytes = (RS_WORK_PREPARE_BYTES + RS_WORK_SH_BYTES * c.sh) * c.gaussians;
   KernelWork out = times(c.gaussians, gaussian) + moved(bytes, bytes);
   out.launches = out.shared = 1;
@@ -97,15 +97,15 @@ KernelWork forward_work(const ExecutedCounts& c, bool keep) {
         times(c.boxes, {.vectors = 45, .scalars = 38, .local = 3, .trips = 1, .barriers = 3}) +
         times(c.rounds, {.vectors = 90, .scalars = 70, .local = 10, .trips = 1, .barriers = 4}) +
         times(c.ordered, {.vectors = 9, .scalars = 3, .local = 1}) +
-        times(c.tested, {.vectors = 52, .scalars = 18, .slow = 1, .local = 3, .trips = 2}) +
+        times(c.tested, {.vectors = 49, .scalars = 18, .slow = 1, .local = 3, .trips = 2}) +
         times(c.opened,
-              {.vectors = 155, .scalars = 85, .slow = 2, .local = 12, .trips = 3, .barriers = 1}) +
+              {.vectors = 152, .scalars = 85, .slow = 2, .local = 12, .trips = 3, .barriers = 1}) +
         times(c.compared, {.vectors = 20, .scalars = 18, .local = 4}) +
         times(c.packets, {.vectors = 150, .scalars = 60, .trips = 3});
     if (keep) out = out + times(c.opened, {.vectors = 36, .scalars = 27, .local = 2, .trips = 1});
   } else {
-    const KernelWork tested = c.peak_order ? KernelWork{.vectors = 80, .scalars = 56, .slow = 1}
-                                           : KernelWork{.vectors = 95, .scalars = 56, .slow = 3};
+    const KernelWork tested = c.peak_order ? KernelWork{.vectors = 74, .scalars = 56, .slow = 1}
+                                           : KernelWork{.vectors = 90, .scalars = 56, .slow = 3};
     out = times(c.boxes, {.vectors = 14, .scalars = 12}) +
           times(c.rounds, {.vectors = 5, .scalars = 30}) +
           times(c.ordered, {.vectors = 3, .scalars = 9}) + times(c.tested, tested) +
@@ -128,16 +128,16 @@ KernelWork forward_work(const ExecutedCounts& c, bool keep) {
 }
 
 KernelWork backward_work(const ExecutedCounts& c) {
-  KernelWork out = c.grouped ? times(c.opened, {.vectors = 380,
-                                                .scalars = 110,
+  KernelWork out = c.grouped ? times(c.opened, {.vectors = 367,
+                                                .scalars = 120,
                                                 .slow = 8,
                                                 .local = 36,
-                                                .atomics = 16,
+                                                .atomics = 13,
                                                 .trips = 3,
                                                 .barriers = 5}) +
                                    times(c.windows, {.vectors = 33, .scalars = 17, .local = 4}) +
                                    times(c.packets, {.vectors = 150, .scalars = 40, .trips = 3})
-                             : times(c.opened, {.vectors = 267, .scalars = 117, .slow = 5}) +
+                             : times(c.opened, {.vectors = 247, .scalars = 117, .slow = 5}) +
                                    times(c.windows, {.vectors = 6, .scalars = 5}) +
                                    times(c.packets, {.vectors = 250, .scalars = 550});
   // Of a tile the first packet that meets a Gaussian fetches its line and its sums, which go back.
@@ -153,13 +153,13 @@ KernelWork backward_work(const ExecutedCounts& c) {
 
 KernelWork finalize_work(const ExecutedCounts& c) {
   const double further = c.sh - 1;
-  const KernelWork gaussian = c.grouped ? KernelWork{.vectors = (1090 + 93 * further) / kWave,
-                                                     .scalars = (275 + 12 * further) / kWave,
+  const KernelWork gaussian = c.grouped ? KernelWork{.vectors = (1023 + 93 * further) / kWave,
+                                                     .scalars = (228 + 12 * further) / kWave,
                                                      .slow = 15 / kWave,
                                                      .local = (170 + 12 * further) / kWave,
                                                      .trips = (12 + 0.5 * further) / kWave,
                                                      .barriers = (21 + further) / kWave}
-                                        : KernelWork{.vectors = 150 + 1.8 * further,
+                                        : KernelWork{.vectors = 146 + 1.8 * further,
                                                      .scalars = 26,
                                                      .slow = 1.2,
                                                      .parked = 14 + 0.2 * further};

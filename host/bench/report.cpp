@@ -38,7 +38,8 @@ std::vector<std::string> left_out_lines(const BenchReport& report) {
     line += (line.empty() ? "" : " ") + row.id;
   }
   std::vector<std::string> out;
-  for (const auto& [reason, line] : ids) out.push_back(line + ": " + reason);
+  out.reserve(ids.size());
+  for (const auto& [reason, line] : ids) out.push_back(fmt::format("{}: {}", line, reason));
   return out;
 }
 

@@ -32,6 +32,7 @@ class Canaries {
   void check(const cl::CommandQueue& queue, const std::string& what);
 
  private:
+  // NOLINTNEXTLINE(bugprone-exception-escape): a release that OpenCL refuses ends the program
   struct Guarded {
     cl::Buffer part;   // what the user of the buffer has
     cl::Buffer whole;  // with the canaries

@@ -19,13 +19,20 @@ constexpr double kC2 = 0.03 * 0.03;
 
 using Window = std::array<std::array<double, 2 * kRadius + 1>, 2 * kRadius + 1>;
 
+template <typename Weights>
+auto& weight_at(Weights& window, int x, int y) {
+  const auto column = static_cast<std::size_t>(x) + kRadius;
+  const auto row = static_cast<std::size_t>(y) + kRadius;
+  return window[row][column];
+}
+
 Window make_window() {
   Window out;
   double sum = 0.0;
   for (int y = -kRadius; y <= kRadius; ++y) {
     for (int x = -kRadius; x <= kRadius; ++x) {
       const double w = std::exp(-(x * x + y * y) / (2.0 * kSigma * kSigma));
-      out[static_cast<std::size_t>(y + kRadius)][static_cast<std::size_t>(x + kRadius)] = w;
+      weight_at(out, x, y) = w;
       sum += w;
     }
   }
@@ -44,8 +51,7 @@ void for_window(const Window& window, int x, int y, int width, int height, const
       if (x + u < 0 || x + u >= width || y + v < 0 || y + v >= height) continue;
       const auto pixel = static_cast<std::size_t>(y + v) * static_cast<std::size_t>(width) +
                          static_cast<std::size_t>(x + u);
-      visit(pixel,
-            window[static_cast<std::size_t>(v + kRadius)][static_cast<std::size_t>(u + kRadius)]);
+      visit(pixel, weight_at(window, u, v));
     }
   }
 }

@@ -14,6 +14,7 @@ constexpr float kByte = 255.0f;
 constexpr float kShort = 65535.0f;
 
 std::uint32_t rounded(float unit, float most) {
+  // NOLINTNEXTLINE(bugprone-incorrect-roundings): never negative, and no call for every number
   return static_cast<std::uint32_t>(unit * most + 0.5f);
 }
 

@@ -125,8 +125,8 @@ void map_shapes(Gaussians& out, const glm::dmat3& linear, const glm::dmat3& orth
 void map_colors(Gaussians& out, const glm::dmat3& orthogonal) {
   const auto stride = static_cast<std::size_t>(sh_coefficients(out.sh_degree));
   for (int degree = 1; degree <= out.sh_degree; ++degree) {
-    const auto first = static_cast<std::size_t>(degree * degree);
-    const auto size = static_cast<std::size_t>(2 * degree + 1);
+    const auto number = static_cast<std::size_t>(degree);
+    const std::size_t first = number * number, size = 2 * number + 1;
     const std::vector<double> map = sh_band_map(degree, orthogonal);
     std::array<double, 2 * kMaxDegree + 1> band{};
     for (std::size_t i = 0; i < out.size(); ++i) {
@@ -164,8 +164,8 @@ std::vector<double> sh_band_map(int degree, const glm::dmat3& orthogonal) {
   // The band's functions at more directions than it has, before and after the map; least squares
   // gives the matrix between both, which is exact because orthogonal maps keep a band to itself.
   constexpr int kDirections = 64;
-  const auto first = static_cast<std::size_t>(degree * degree);
-  const auto size = static_cast<std::size_t>(2 * degree + 1);
+  const auto number = static_cast<std::size_t>(degree);
+  const std::size_t first = number * number, size = 2 * number + 1;
   std::vector<double> gram(size * size, 0.0);
   std::vector<double> map(size * size, 0.0);
   std::array<double, sh_coefficients(kMaxDegree)> at{}, before{};

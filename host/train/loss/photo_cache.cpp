@@ -22,7 +22,7 @@ std::size_t largest_photo(const std::vector<View>& views) {
 }  // namespace
 
 PhotoCache::PhotoCache(Context& context,
-                       std::vector<View> views,
+                       const std::vector<View>& views,
                        std::size_t budget,
                        std::size_t ahead)
     : context_(context),

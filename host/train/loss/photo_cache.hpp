@@ -27,7 +27,10 @@ namespace raysplats {
 class PhotoCache {
  public:
   /// `budget` in bytes of the device. The host holds `ahead` photos that are about to be asked for.
-  PhotoCache(Context& context, std::vector<View> views, std::size_t budget, std::size_t ahead);
+  PhotoCache(Context& context,
+             const std::vector<View>& views,
+             std::size_t budget,
+             std::size_t ahead);
 
   /// The photo of a view (an index into `views`) reduced to width x height (area average), until
   /// the next call. Waits for the file, not for the device.

@@ -100,8 +100,9 @@ TEST_CASE("disturbed poses of photos come back, and the model with them") {
   MESSAGE("clean " << best << " dB, disturbed " << worst << ", refined " << refined
                    << "; median turn " << median(turns) << " degrees, shift "
                    << 100.0 * median(shifts) << " %");
-  // Measured: 32.7 dB of 33.1, 21.5 without; 0.14 degrees, where a pixel is 0.56, and 0.24 %.
-  CHECK(refined > best - 0.7);
+  // Of six seeds: 0.35 to 0.80 dB below 33.3, 22.1 without; 0.11 to 0.13 degrees, where a pixel is
+  // 0.56, and 0.21 to 0.25 %.
+  CHECK(refined > best - 1.0);
   CHECK(refined > worst + 5.0);
   CHECK(median(turns) < 0.17);
   CHECK(median(shifts) < 0.003);
