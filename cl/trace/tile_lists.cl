@@ -264,8 +264,9 @@ typedef struct {
 
 // Lower bound of the depth of all hits of one Gaussian in a tile: of its own least depth, and of
 // the plane <o', x'> = limit in whitened space, beyond which all its hits lie: limit is Q in peak
-// order (Thales: peaks lie on the sphere over mean and camera), sqrt(Q) |o'| for near roots. The
-// depth of the plane is a ratio of linear functions of the ray, so its least value is at a corner.
+// order (Thales: peaks lie on the sphere over mean and camera), sqrt(Q) |o'| for near roots; here
+// in shares of |o'|^2. The depth of the plane is a ratio of linear functions of the ray, so its
+// least value is at a corner.
 void depth_planes(const fv* b, __global const RsLine* lines, DepthPlanes* planes) {
   fv v[16];
   load_columns(lines->v, 16, LANES == 1 ? 9 : 16, v);
