@@ -4,7 +4,7 @@
 // alpha needs its colour and what lies behind it: the sum of T alpha colour over farther hits,
 // which is gathered pairwise among rows whose windows overlap (lanes may meet them in either order)
 // and in one sum beyond. Nothing is subtracted, and nothing divided where alpha = 1: only the last
-// hit of a ray can be opaque. The 16 components of a Gaussian's line are summed over the rays of
+// hit of a ray can be opaque. The components of a Gaussian's line are summed over the rays of
 // the packet and added to memory once.
 //   PRIVATE_COPIES 1: work-item g of `copies` takes every copies-th tile and adds to its own copy
 //                     of the gradient lines: no atomics, the same sum every time.

@@ -8,8 +8,9 @@
 // Words of one sum lie 16 apart, because 16 sums are updated together. The lowest bit weighs
 // 2^RS_EXACT_LOW; what lies below is cut off, for every addend alike. An addend at or above `limit`
 // in absolute value, or one that is not finite, makes the sum NaN. The sums stay in range when
-// limit times the number of addends is at most 2^RS_EXACT_HIGH: gradients of lines grow with the
-// square of the scene's size, and those of a view of 2^24 pixels of a scene of 10^7 units fit.
+// limit times the number of addends is at most 2^RS_EXACT_HIGH: gradients of lines grow with no
+// more than the square of the scene's size, and those of a view of 2^24 pixels of a scene of 10^7
+// units fit.
 #ifndef RS_TRACE_EXACT_SUM_H
 #define RS_TRACE_EXACT_SUM_H
 

@@ -64,7 +64,7 @@ RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
                                     const uint reference,
                                     const float* g) {
   const bool general = reference & 1;
-  const size_t first = (size_t)(reference >> 1) * 16;
+  const size_t line = (size_t)(reference >> 1) * 16;
 #if SUBGROUP
   (void)memory;
   float mine[RS_SUM_EACH];
@@ -77,7 +77,7 @@ RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
 #pragma unroll
   for (int i = 0; i < RS_SUM_EACH; ++i) {
     const int k = lane + i * GROUP;
-    if (k < 16 && has_number(general, k)) rs_add_sum(sums, first + k, mine[i]);
+    if (k < 16 && has_number(general, k)) rs_add_sum(sums, line + k, mine[i]);
   }
 #else
 #pragma unroll
@@ -97,7 +97,7 @@ RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
     if (!has_number(general, k)) continue;
     float sum = memory->sum[0][k];
     for (int j = 1; j < RS_SUM_PARTS; ++j) sum += memory->sum[j][k];
-    rs_add_sum(sums, first + k, sum);
+    rs_add_sum(sums, line + k, sum);
   }
 #endif
 }

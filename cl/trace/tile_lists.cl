@@ -256,9 +256,9 @@ iv depth_key(const fv depth, const uint first_step) {
 // What the least depth of Gaussians in a tile needs of their lines.
 typedef struct {
   fv mean_x, mean_y;
-  fv slope_x, slope_y;  // of <o', d'>, which is 1 at the mean
+  fv slope_x, slope_y;  // of -<o', d'> in shares of what it is towards the mean
   fv most_x, most_y;    // what a slope adds at the end of the outline
-  fv limit;             // of that product with the point of a hit
+  fv limit;             // depth of the plane towards the mean
   fv depth;             // no hit is nearer
 } DepthPlanes;
 

@@ -34,7 +34,7 @@
 // 3; response 19; blending 9.
 #define RS_WORK_FORWARD_FLOPS 49
 // Near root in entry order.
-#define RS_WORK_ENTRY_FLOPS 9
+#define RS_WORK_ENTRY_FLOPS 10
 
 // trace_backward, per Gaussian: line 64 read, its gradient 64 read and written.
 #define RS_WORK_BACKWARD_GAUSSIAN_BYTES 192
