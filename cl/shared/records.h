@@ -7,6 +7,7 @@
 #include "shared/layout.h"
 #include "shared/light_layout.h"
 #include "shared/ray_layout.h"
+#include "shared/segment_layout.h"
 #include "shared/trace_layout.h"
 #include "shared/train_layout.h"
 
@@ -89,7 +90,11 @@
     FIELD(RsRayWalk, color_from_origin) FIELD(RsRayWalk, has_cones) \
     FIELD(RsRayWalk, padding) \
   RECORD(RsRaySums) FIELD(RsRaySums, screen) FIELD(RsRaySums, gaussians) \
-    FIELD(RsRaySums, limit) FIELD(RsRaySums, padding)
+    FIELD(RsRaySums, limit) FIELD(RsRaySums, padding) \
+  RECORD(RsStreamSegment) FIELD(RsStreamSegment, packet) FIELD(RsStreamSegment, chunk) \
+    FIELD(RsStreamSegment, used) FIELD(RsStreamSegment, rows) FIELD(RsStreamSegment, number) \
+    FIELD(RsStreamSegment, behind) FIELD(RsStreamSegment, front) FIELD(RsStreamSegment, slot) \
+  RECORD(RsReachingRow) FIELD(RsReachingRow, row) FIELD(RsReachingRow, number)
 // clang-format on
 
 #endif

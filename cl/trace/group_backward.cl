@@ -3,7 +3,7 @@
 // streams that trace_forward_group kept. The components of a line's gradient are summed over the
 // rays through local memory, or by the subgroup; one work-item adds one of them to the sums.
 //   PRIVATE_COPIES 1: work-group g of `copies` takes every copies-th tile and adds to its own copy.
-//   otherwise:        a work-group per packet of the band.
+//   otherwise:        a work-group per segment of a stream (stream_segments.cl).
 #ifndef TILE
 #define TILE 16
 #endif
@@ -14,10 +14,10 @@
 #define OPEN_LOCAL 24
 #endif
 
-#include "trace/group.h"
-#include "trace/hit_stream.h"
-#include "trace/line_gradient.h"
+#include "trace/stream_segment.h"
 
+// Rows that reach into a segment and one work-item puts in order.
+#define RS_REACHING_EACH ((OPEN + GROUP - 1) / GROUP)
 // Numbers of a line that are summed at once, and parts in which the rays of a group are, so that
 // all work-items have a share.
 #define RS_SUM_NUMBERS 8
@@ -102,9 +102,12 @@ RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
 #endif
 }
 
-// The alpha of the Gaussian of line v in the packet's rays.
-float group_alpha(__global const float* v, const PacketMeeting* m) {
-  return v[12] * rs_exp(-0.5f * m->numerator / m->direction2);
+// The row of the slot is closed: whatever is still to come lies before it.
+void close_hit(const float before, const float from_here, ClosedHit* closed) {
+  if (before >= closed->before) {
+    closed->before = before;
+    closed->from_here = from_here;
+  }
 }
 
 // The row of the slot has met all rows that it may change places with: its gradient is complete.
@@ -121,10 +124,7 @@ RS_GROUP_INLINE void close_row(__local BackwardMemory* memory,
   const float alpha = group_alpha(v, &m);
   const float before = rs_row_get(memory->before, own->before, slot, lane);
   const float from_here = rs_row_get(memory->from_here, own->from_here, slot, lane);
-  if (before >= closed->before) {
-    closed->before = before;
-    closed->from_here = from_here;
-  }
+  close_hit(before, from_here, closed);
   const float projected = rs_projected(p, v, &m);
   // Only the last hit of a ray can be opaque, and only the background is behind that.
   const float behind =
@@ -137,85 +137,216 @@ RS_GROUP_INLINE void close_row(__local BackwardMemory* memory,
   group_add_line(memory, lane, &scene.sums, reference, g);
 }
 
-// `works`: whether there is a packet at (group_x, group_y); otherwise nothing happens.
-RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
-                                    const int lane,
-                                    const bool works,
-                                    const BackwardScene scene,
-                                    const int group_x,
-                                    const int group_y) {
-  const uint2 tail = works
-                         ? scene.stream_ends[rs_group_number(scene.camera->width, group_x, group_y)]
-                         : (uint2)(RS_NO_CHUNK, 0);
-  Pixels p;
-  load_pixels(&p, scene, group_x + lane % RS_GROUP_WIDTH, group_y + lane / RS_GROUP_WIDTH);
-  OwnBackwardRows own;
-  ClosedHit closed = {0.0f, 0.0f};
-  RowSet open = 0;  // slots that are taken, a bit each
-  // Rows are numbered downwards from a number that no window reaches below.
-  uint number = 0x80000000u;
-  const bool crowded = (tail.y & RS_STREAM_CROWDED) != 0;
-  uint chunk = crowded == (CROWDED != 0) ? tail.x : RS_NO_CHUNK;
-  uint used = tail.y & ~RS_STREAM_CROWDED;
-  while (chunk != RS_NO_CHUNK) {
-    const size_t first = (size_t)chunk * CHUNK;
-    for (uint n = used - 1; n > 0; --n, --number) {
-      RowSet closing = 0;
-      for (RowSet rest = open; rest != 0; rest &= rest - 1) {
-        if (memory->oldest[rs_first_slot(rest)] > number) closing |= rest & -rest;
-      }
-      open &= ~closing;
-      for (; closing != 0; closing &= closing - 1)
-        close_row(memory, &own, lane, rs_first_slot(closing), &p, scene, &closed);
-      const uint2 row = scene.pool[first + n];
-      const float before = scene.pool_transmittance[(first + n) * GROUP + lane];
-      __global const float* v = scene.lines[row.x >> 1].v;
-      const PacketMeeting m = rs_meet(v, row.x & 1, 0.0f, p.X, p.Y);
-      const float mine = before * group_alpha(v, &m) * rs_projected(&p, v, &m);
-      ClosedHit next = closed;  // the nearest behind this one
-      // Hits too faint to change the transmittance tie with the one behind them. Whatever ties has
-      // one sum, that of all of them, so that it does not matter which is taken for the nearest.
-      ClosedHit tied = {0.0f, 0.0f};
-      for (RowSet rest = open; rest != 0; rest &= rest - 1) {
-        const uint slot = rs_first_slot(rest);
-        const float other = rs_row_get(memory->before, own.before, slot, lane);
-        const bool farther = other < before;
-        if (farther ? other <= next.before : before <= 0.0f) continue;
-        const float from_there = rs_row_get(memory->from_here, own.from_here, slot, lane);
-        if (farther) {
-          next.before = other;
-          next.from_here = from_there;
-        } else {
-          rs_row_set(memory->from_here, own.from_here, slot, lane, from_there + mine);
-          if (other == before) {
-            tied.before = other;
-            tied.from_here = from_there;
-          }
-        }
-      }
-      if (tied.before > 0.0f) next = tied;
-      const uint slot = rs_first_slot(~open);
-      open |= RS_SLOT(slot);
-      rs_row_set(memory->before, own.before, slot, lane, before);
-      rs_row_set(memory->from_here, own.from_here, slot, lane, next.from_here + mine);
-      if (lane == 0) {
-        memory->reference[slot] = row.x;
-        memory->oldest[slot] = number - row.y;
-      }
-      rs_group_barrier();
-    }
-    chunk = scene.pool[first].x;
-    used = CHUNK;
+// Rows that a group still has to read: first those of segments behind that its own may change
+// places with, then its own, from the last one on.
+typedef struct {
+  uint reaching;  // of the first kind
+  uint chunk, n;  // of the second: chunk, and row in it
+  uint rows;      // of the second, or more where a stream ends by itself
+  uint number;
+} RowsToRead;
+
+// Puts the rows that reach into a segment in the order of its stream, the last one first: they were
+// written in any order, and sums must not depend on it.
+RS_GROUP_INLINE void order_reaching(__global RsReachingRow* rows,
+                                    const uint count,
+                                    const int lane) {
+  RsReachingRow own[RS_REACHING_EACH];
+  uint place[RS_REACHING_EACH];
+#pragma unroll
+  for (int k = 0; k < RS_REACHING_EACH; ++k) {
+    place[k] = lane + k * GROUP;
+    if (place[k] >= count) continue;
+    own[k] = rows[place[k]];
+    place[k] = 0;
+    for (uint j = 0; j < count; ++j) place[k] += rows[j].number > own[k].number ? 1 : 0;
   }
-  for (; open != 0; open &= open - 1)
-    close_row(memory, &own, lane, rs_first_slot(open), &p, scene, &closed);
+  RS_GROUP_BARRIER(CLK_GLOBAL_MEM_FENCE);
+#pragma unroll
+  for (int k = 0; k < RS_REACHING_EACH; ++k) {
+    if (place[k] < count) rows[place[k]] = own[k];
+  }
+  RS_GROUP_BARRIER(CLK_GLOBAL_MEM_FENCE);
 }
 
+// Goes on to the row in front.
+void pass_row(RowsToRead* rows, __global const uint2* pool) {
+  --rows->number;
+  --rows->rows;
+  if (--rows->n == 0) {
+    rows->chunk = pool[(size_t)rows->chunk * CHUNK].x;
+    rows->n = CHUNK - 1;
+  }
+}
+
+// The open rows hear of those in front of the segment that may lie behind them: `rows` begin there.
+RS_GROUP_INLINE void hear_front(__local BackwardMemory* memory,
+                                OwnBackwardRows* own,
+                                const int lane,
+                                const RowSet open,
+                                const BackwardScene scene,
+                                const Pixels* p,
+                                RowsToRead rows) {
+  uint first = RS_LAST_NUMBER;
+  for (RowSet rest = open; rest != 0; rest &= rest - 1)
+    first = min(first, memory->oldest[rs_first_slot(rest)]);
+  while (rows.number >= first && rows.chunk != RS_NO_CHUNK) {
+    const StreamHit hit = stream_hit(scene, p, rows.chunk * CHUNK + rows.n, lane);
+    for (RowSet rest = open; rest != 0; rest &= rest - 1) {
+      const uint slot = rs_first_slot(rest);
+      if (rs_row_get(memory->before, own->before, slot, lane) < hit.before) continue;
+      const float from_there = rs_row_get(memory->from_here, own->from_here, slot, lane);
+      rs_row_set(memory->from_here, own->from_here, slot, lane, from_there + hit.share);
+    }
+    pass_row(&rows, scene.pool);
+  }
+}
+
+// `behind`: of the ray, the sum over all rows behind those to read but the ones that reach into
+// them.
+RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
+                                    const int lane,
+                                    const BackwardScene scene,
+                                    const Pixels* p,
+                                    RowsToRead rows,
+                                    __global const RsReachingRow* reaching,
+                                    const float behind) {
+  OwnBackwardRows own;
+  ClosedHit closed = {0.0f, behind};
+  RowSet open = 0;    // slots that are taken, a bit each
+  RowSet guests = 0;  // those whose gradients are for the segment behind
+  while (rows.reaching > 0 || (rows.rows > 0 && rows.chunk != RS_NO_CHUNK)) {
+    const bool guest = rows.reaching > 0;
+    const uint number = guest ? reaching->number : rows.number;
+    RowSet closing = 0;
+    for (RowSet rest = open; rest != 0; rest &= rest - 1) {
+      if (memory->oldest[rs_first_slot(rest)] > number) closing |= rest & -rest;
+    }
+    const RowSet left = closing & guests;
+    for (RowSet rest = left; rest != 0; rest &= rest - 1) {
+      const uint slot = rs_first_slot(rest);
+      close_hit(rs_row_get(memory->before, own.before, slot, lane),
+                rs_row_get(memory->from_here, own.from_here, slot, lane), &closed);
+    }
+    open &= ~closing;
+    closing &= ~guests;
+    guests &= open;
+    for (; closing != 0; closing &= closing - 1)
+      close_row(memory, &own, lane, rs_first_slot(closing), p, scene, &closed);
+    const size_t row = guest ? reaching->row : rows.chunk * CHUNK + rows.n;
+    const StreamHit hit = stream_hit(scene, p, row, lane);
+    const float before = hit.before;
+    ClosedHit next = closed;  // the nearest behind this one
+    // Hits too faint to change the transmittance tie with the one behind them. Whatever ties has
+    // one sum, that of all of them, so that it does not matter which is taken for the nearest.
+    ClosedHit tied = {0.0f, 0.0f};
+    for (RowSet rest = open; rest != 0; rest &= rest - 1) {
+      const uint slot = rs_first_slot(rest);
+      const float other = rs_row_get(memory->before, own.before, slot, lane);
+      const bool farther = other < before;
+      if (farther ? other <= next.before : before <= 0.0f) continue;
+      const float from_there = rs_row_get(memory->from_here, own.from_here, slot, lane);
+      if (farther) {
+        next.before = other;
+        next.from_here = from_there;
+      } else {
+        rs_row_set(memory->from_here, own.from_here, slot, lane, from_there + hit.share);
+        if (other == before) {
+          tied.before = other;
+          tied.from_here = from_there;
+        }
+      }
+    }
+    if (tied.before > 0.0f) next = tied;
+    // Others may still read of what a guest leaves. (There is room: the forward pass, too, takes no
+    // slot anew that has just become free.)
+    const uint slot = rs_first_slot(~(open | left));
+    open |= RS_SLOT(slot);
+    guests |= guest ? RS_SLOT(slot) : 0;
+    rs_row_set(memory->before, own.before, slot, lane, before);
+    rs_row_set(memory->from_here, own.from_here, slot, lane, next.from_here + hit.share);
+    if (lane == 0) {
+      memory->reference[slot] = hit.row.x;
+      memory->oldest[slot] = number - hit.row.y;
+    }
+    rs_group_barrier();
+    if (guest) {
+      --rows.reaching;
+      ++reaching;
+    } else {
+      pass_row(&rows, scene.pool);
+    }
+  }
+  open &= ~guests;
+  hear_front(memory, &own, lane, open, scene, p, rows);
+  for (; open != 0; open &= open - 1)
+    close_row(memory, &own, lane, rs_first_slot(open), p, scene, &closed);
+}
+
+// Pixels of the packet at `corner`, a work-item its own.
+RS_GROUP_INLINE void load_group_pixels(Pixels* p,
+                                       const BackwardScene scene,
+                                       const int2 corner,
+                                       const int lane) {
+  load_pixels(p, scene, corner.x + lane % RS_GROUP_WIDTH, corner.y + lane / RS_GROUP_WIDTH);
+}
+
+#if PRIVATE_COPIES
+// The whole stream of a packet. `works`: whether there is a packet; otherwise nothing happens.
+RS_GROUP_INLINE void packet_backward(__local BackwardMemory* memory,
+                                     const int lane,
+                                     const bool works,
+                                     const BackwardScene scene,
+                                     const int2 corner) {
+  const uint2 tail =
+      works ? scene.stream_ends[rs_group_number(scene.camera->width, corner.x, corner.y)]
+            : (uint2)(RS_NO_CHUNK, 0);
+  const bool mine = ((tail.y & RS_STREAM_CROWDED) != 0) == (CROWDED != 0);
+  const RowsToRead rows = {0, mine ? tail.x : RS_NO_CHUNK, (tail.y & ~RS_STREAM_CROWDED) - 1,
+                           0xffffffffu, RS_LAST_NUMBER};
+  Pixels p;
+  load_group_pixels(&p, scene, corner, lane);
+  group_backward(memory, lane, scene, &p, rows, 0, 0.0f);
+}
+#else
+// Segment number `place`, if there is one and it is for this launch.
+RS_GROUP_INLINE void segment_backward(__local BackwardMemory* memory,
+                                      const int lane,
+                                      const uint place,
+                                      const BackwardScene scene,
+                                      RS_SEGMENT_ARGUMENTS(const)) {
+  RsStreamSegment segment = {0, RS_NO_CHUNK, 0, 0, 0, RS_NO_SEGMENT, RS_NO_SEGMENT, RS_NO_SEGMENT};
+  if (place < counts[RS_SEGMENT_COUNT]) segment = segments[place];
+  const bool mine =
+      segment.chunk != RS_NO_CHUNK && ((segment.used & RS_STREAM_CROWDED) != 0) == (CROWDED != 0);
+  Pixels p;
+  load_group_pixels(&p, scene, packet_corner(scene.camera->width, segment.packet), lane);
+  RowsToRead rows = {0, segment.chunk, (segment.used & ~RS_STREAM_CROWDED) - 1,
+                     mine ? segment.rows : 0, segment.number};
+  const bool cut = mine && segment.slot != RS_NO_SEGMENT;
+  float behind = 0.0f;
+  if (cut) {
+    rows.reaching = min(counts[RS_SEGMENT_COUNTS + segment.slot], (uint)OPEN);
+    reaching += (size_t)segment.slot * RS_SEGMENT_REACHING;
+    for (uint next = segment.behind; next != RS_NO_SEGMENT; next = segments[next].behind)
+      behind += segment_sums[(size_t)segments[next].slot * GROUP + lane];
+  }
+  order_reaching(reaching, rows.reaching, lane);
+  for (uint i = 0; i < rows.reaching; ++i)
+    behind -= stream_hit(scene, &p, reaching[i].row, lane).share;
+  group_backward(memory, lane, scene, &p, rows, reaching, behind);
+}
+#endif
+
+#if PRIVATE_COPIES
 RS_GROUP_KERNEL __kernel void trace_backward_group(RS_BACKWARD_ARGUMENTS) {
+#else
+RS_GROUP_KERNEL __kernel void trace_backward_group(RS_BACKWARD_ARGUMENTS,
+                                                   RS_SEGMENT_ARGUMENTS(const)) {
+#endif
   __local BackwardMemory memory;
   const RsCamera camera = camera_argument;
   const RsBackward backward = backward_argument;
-  const uint tiles_x = backward.tiles_x, tile_row = backward.tile_row;
   const int lane = rs_group_lane();
   BackwardScene scene =
       backward_scene(&camera, &backward, tangents, transmittances, stream_ends, pool,
@@ -224,7 +355,7 @@ RS_GROUP_KERNEL __kernel void trace_backward_group(RS_BACKWARD_ARGUMENTS) {
   // Tiles are numbered over the whole image, so that the sums do not depend on the bands.
   const uint group = get_group_id(0);
   scene.sums.lines += (size_t)group * backward.gaussians * 16;
-  const uint groups = backward.copies;
+  const uint groups = backward.copies, tiles_x = backward.tiles_x, tile_row = backward.tile_row;
   const uint first = tile_row * tiles_x, end = first + backward.tile_rows * tiles_x;
   for (uint tile = first + (group + groups - first % groups) % groups; tile < end; tile += groups) {
     const bool works = rs_on_face(tiles, face, tile);
@@ -232,15 +363,14 @@ RS_GROUP_KERNEL __kernel void trace_backward_group(RS_BACKWARD_ARGUMENTS) {
     const int y0 = tile / tiles_x * TILE;
     for (int y = y0; y < min(y0 + TILE, camera.height); y += RS_GROUP_HEIGHT) {
       for (int x = x0; x < min(x0 + TILE, camera.width); x += RS_GROUP_WIDTH) {
-        group_backward(&memory, lane, works, scene, x, y);
+        packet_backward(&memory, lane, works, scene, (int2)(x, y));
       }
     }
   }
 #else
-  const int x = (int)get_group_id(0) * RS_GROUP_WIDTH;
-  const int y = (int)get_global_id(1) * RS_GROUP_HEIGHT + tile_row * TILE;
-  const bool works = x < camera.width && y < camera.height &&
-                     rs_on_face(tiles, face, y / TILE * tiles_x + x / TILE);
-  group_backward(&memory, lane, works, scene, x, y);
+  (void)tiles;
+  (void)face;
+  segment_backward(&memory, lane, get_global_id(0) / GROUP, scene, segments, counts, segment_sums,
+                   reaching);
 #endif
 }

@@ -147,7 +147,8 @@ KernelWork backward_work(const ExecutedCounts& c) {
   out = out +
         moved(RS_WORK_BACKWARD_PIXEL_BYTES * c.pixels + c.stream_bytes + 2 * kLine * c.gaussians,
               c.stream_bytes);
-  out.launches = out.shared = 2;
+  // Sums of segments, of long streams alone, are not counted.
+  out.launches = out.shared = c.grouped ? 6 : 2;
   return out;
 }
 

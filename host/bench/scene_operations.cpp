@@ -110,7 +110,8 @@ BenchOperation SceneBench::Impl::backward() {
           {},
           [this] { tracer().backward(gaussians(), image_gradient, gradients); },
           {{"backward",
-            {"trace/camera_backward.cl", "trace/group_backward.cl", ":(fill)"},
+            {"trace/camera_backward.cl", "trace/stream_segments.cl", "trace/group_backward.cl",
+             ":(fill)"},
             false,
             [this] { return backward_work(kept_statistics); }},
            {"finalize", {"trace/finalize_gradients.cl", "trace/group_finalize.cl"}, false, [this] {
@@ -144,7 +145,8 @@ BenchOperation SceneBench::Impl::packets(PacketShape shape) {
             false,
             [this] { return forward_work(shaped_statistics); }},
            {"backward-" + name,
-            {"trace/camera_backward.cl", "trace/group_backward.cl", ":(fill)"},
+            {"trace/camera_backward.cl", "trace/stream_segments.cl", "trace/group_backward.cl",
+             ":(fill)"},
             false,
             [this] { return backward_work(shaped_statistics); }}},
           true};

@@ -10,6 +10,11 @@
 #include "trace/gaussian_kernel.hpp"
 
 namespace raysplats {
+namespace {
+
+constexpr std::size_t kListGroup = 64;
+
+}  // namespace
 
 void CameraTracer::backward(const DeviceGaussians& gaussians,
                             const Buffer<float>& image_gradient,
@@ -94,6 +99,25 @@ std::vector<Kernel> CameraTracer::Impl::backward_pass(int lens,
   return kernels.backward(choice.define(build, context.device()));
 }
 
+std::array<Kernel, 2> CameraTracer::Impl::segment_pass(int lens, bool with_depth) {
+  BuildOptions build = kernels.build(lens);
+  build.define("DEPTH_GRADIENT", with_depth ? 1 : 0);
+  return kernels.segments(build);
+}
+
+// Cuts the streams of the rows of tiles that `pass` names into segments.
+void CameraTracer::Impl::cut_streams(const Buffer<float>& image_gradient, const RsBackward& pass) {
+  auto [list, sum] = segment_pass(lens_kind, depth_gradient != nullptr);
+  segments.prepare(packet_count(), streams.capacity());
+  const Range all = kernels.range(list, 1, camera.width, {lists.tiles_x(), 0, pass.tile_rows});
+  list.launch(Range::linear(all.global[0] / kernels.items() * all.global[1], kListGroup),
+              view_arguments(), pass, streams.ends(), streams.pool(), segments.segments(),
+              segments.counts());
+  launch_in_bands(context, segment_budgets[0], sum, segments.room() * kernels.items(),
+                  kernels.items(), view_arguments(), pass, streams.arguments(), lists.lines(),
+                  image_gradient, depth_slopes(), segments.arguments());
+}
+
 void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
                                          std::uint32_t row,
                                          std::uint32_t rows) {
@@ -107,6 +131,18 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
   pass.screen_y = screen_y();
   // No ray meets a Gaussian twice.
   pass.limit = GradientSums::limit(packet_count() * static_cast<std::size_t>(packet().lanes));
+  pass.tile_row = row;
+  pass.tile_rows = rows;
+  if (cuts_streams(sums.choice())) {
+    cut_streams(image_gradient, pass);
+    for (std::size_t k = 0; k < launched.size(); ++k) {
+      launch_in_bands(context, segment_budgets[k + 1], launched[k],
+                      segments.room() * kernels.items(), kernels.items(), view_arguments(), pass,
+                      streams.arguments(), lists.lines(), image_gradient, depth_slopes(),
+                      sums.target(), segments.arguments());
+    }
+    return;
+  }
   const bool shared = !sums.is_private();
   // All bands of a kernel before the next one: private sums keep that order whatever the bands.
   for (std::size_t k = 0; k < launched.size(); ++k) {
@@ -119,8 +155,7 @@ void CameraTracer::Impl::launch_backward(const Buffer<float>& image_gradient,
           shared ? kernels.range(kernel, 1, camera.width, {lists.tiles_x(), first, number})
                  : Range{{sums.copies() * kernels.items(), 1, 1}, {kernels.items(), 1, 1}, {}};
       kernel.launch(range, view_arguments(), pass, streams.arguments(), lists.lines(),
-                    image_gradient, depth_gradient != nullptr ? *depth_gradient : no_depth_gradient,
-                    sums.target());
+                    image_gradient, depth_slopes(), sums.target());
     });
   }
 }

@@ -19,6 +19,14 @@ namespace {
 
 const std::vector<int> kFront{0};
 
+// Groups of the first launch by segments, none of which has many rows: a view of 500 x 500 pixels,
+// say, takes one launch from the start.
+constexpr std::uint32_t kFirstSegments = 8192;
+
+LaunchBudget segment_budget(const TraceOptions& options, const DeviceInfo& device) {
+  return {options.launch_budget_ms, device.type, kFirstSegments};
+}
+
 TraceOptions checked(const TraceOptions& options) {
   check_trace_options(options);
   return options;
@@ -39,8 +47,15 @@ CameraTracer::Impl::Impl(Context& context_in, const TraceOptions& options_in)
       forward_budget(options_in.launch_budget_ms, context_in.device().type),
       backward_budgets{LaunchBudget(options_in.launch_budget_ms, context_in.device().type),
                        LaunchBudget(options_in.launch_budget_ms, context_in.device().type)},
+      segment_budgets{segment_budget(options_in, context_in.device()),
+                      segment_budget(options_in, context_in.device()),
+                      segment_budget(options_in, context_in.device())},
       watched_budget(LaunchBudget::kWatched, context_in.device().type),
-      streams(context_in, packet().lanes, shares.hit_streams()),
+      segments(context_in, packet().lanes),
+      streams(context_in,
+              packet().lanes,
+              packet().grouped ? StreamSegments::chunk_bytes(packet().lanes) : 0,
+              shares.hit_streams()),
       counters(context_in, RS_COUNT_WORDS, "trace counters"),
       overflow(context_in, 1, "overflow of a view"),
       sums(context_in, "line gradients") {
@@ -81,7 +96,9 @@ void CameraTracer::Impl::begin_programs(const DeviceGaussians& gaussians,
   lists.begin_programs(gaussians, lens, options);
   forward_pass(lens, keep);
   if (!keep) return;
-  backward_pass(lens, sum_choice(gaussians.count), with_depth);
+  const GradientSumChoice choice = sum_choice(gaussians.count);
+  backward_pass(lens, choice, with_depth);
+  if (cuts_streams(choice)) segment_pass(lens, with_depth);
   finalize_kernel(gaussians, lens, with_depth, false, false);
 }
 

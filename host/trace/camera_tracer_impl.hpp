@@ -21,6 +21,7 @@
 #include "trace/lens_tiles.hpp"
 #include "trace/memory_shares.hpp"
 #include "trace/packet_kernels.hpp"
+#include "trace/stream_segments.hpp"
 #include "trace/view_sizes.h"
 
 namespace raysplats {
@@ -54,6 +55,11 @@ struct CameraTracer::Impl {
                                  GradientSumChoice::kPacketCopies);
   }
   void launch_backward(const Buffer<float>& image_gradient, std::uint32_t row, std::uint32_t rows);
+  void cut_streams(const Buffer<float>& image_gradient, const RsBackward& pass);
+  bool cuts_streams(const GradientSumChoice& choice) const {
+    return packet().grouped && choice.sum != GradientSum::kCopies;
+  }
+  std::array<Kernel, 2> segment_pass(int lens, bool with_depth);
   void finalize(const DeviceGaussians& gaussians,
                 GaussianGradients& gradients,
                 bool accumulate,
@@ -84,6 +90,9 @@ struct CameraTracer::Impl {
     return argument_pack(camera, face, bent ? lens.tiles() : no_tiles,
                          bent ? lens.tangents() : no_tangents);
   }
+  const Buffer<float>& depth_slopes() const {
+    return depth_gradient != nullptr ? *depth_gradient : no_depth_gradient;
+  }
   float screen_x() const { return static_cast<float>(camera.width) / (2.0f * camera.fx); }
   float screen_y() const { return static_cast<float>(camera.height) / (2.0f * camera.fy); }
   std::size_t pixels() const { return pixel_count(camera.width, camera.height); }
@@ -107,6 +116,7 @@ struct CameraTracer::Impl {
   Buffer<float> no_depth_gradient;
   LaunchBudget forward_budget;
   std::array<LaunchBudget, 2> backward_budgets;  // of the first launch and of the second
+  std::array<LaunchBudget, 3> segment_budgets;   // of sums, and of both launches by segments
   LaunchBudget watched_budget;  // of launches that somebody watches, where no other bounds them
   std::function<void(double)> watch;
   std::size_t watched_tiles = 0;  // of this forward() that are done
@@ -118,6 +128,7 @@ struct CameraTracer::Impl {
   int forward_variant = -1;
   Buffer<float> image;
   Buffer<float> depth;
+  StreamSegments segments;
   HitStreams streams;
   Buffer<std::uint32_t> counters;  // trace/view_sizes.h
   Buffer<std::uint32_t> overflow;

@@ -11,9 +11,10 @@ constexpr std::size_t kGroup = 64;
 
 }  // namespace
 
-HitStreams::HitStreams(Context& context, int lanes, std::size_t share)
+HitStreams::HitStreams(Context& context, int lanes, std::size_t beside, std::size_t share)
     : context_(context),
       lanes_(static_cast<std::size_t>(lanes)),
+      beside_(beside),
       share_(share),
       check_(context.kernel("trace/view_sizes.cl", "check_streams")) {}
 
@@ -31,7 +32,9 @@ void HitStreams::grow(std::size_t chunks, std::size_t least) {
   capacity_ = room;
 }
 
-std::size_t HitStreams::limit() const { return std::min(share_ / chunk_bytes(), largest()); }
+std::size_t HitStreams::limit() const {
+  return std::min(share_ / (chunk_bytes() + beside_), largest());
+}
 
 std::size_t HitStreams::largest() const {
   return std::min<std::size_t>(

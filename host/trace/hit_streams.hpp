@@ -19,8 +19,9 @@ class HitStreams {
   /// Rows of a chunk, the CHUNK of hit_stream.h.
   static constexpr std::uint32_t kChunkRows = 16;
 
-  /// `share` in bytes; `lanes` are the rays of a packet.
-  HitStreams(Context& context, int lanes, std::size_t share);
+  /// `lanes` are the rays of a packet. `share` in bytes, for the pool and for what others keep
+  /// `beside` each of its chunks.
+  HitStreams(Context& context, int lanes, std::size_t beside, std::size_t share);
 
   /// Room for what pixels and packets have one of each; next to none where no hits are `kept`.
   void prepare(std::size_t pixels, std::size_t packets, bool kept);
@@ -45,6 +46,8 @@ class HitStreams {
              const Buffer<std::uint32_t>& counters,
              const Buffer<std::uint32_t>& overflow);
 
+  auto& ends() const { return ends_; }
+  auto& pool() const { return pool_; }
   /// RS_STREAM_ARGUMENTS of cl/trace/arguments.h.
   auto arguments() const {
     return argument_pack(transmittances_, ends_, pool_, pool_transmittance_);
@@ -57,6 +60,7 @@ class HitStreams {
 
   Context& context_;
   std::size_t lanes_;
+  std::size_t beside_;
   std::size_t share_;
   Buffer<float> transmittances_;  // of pixels: behind the last hit, before it
   Buffer<Row> ends_;              // of packets

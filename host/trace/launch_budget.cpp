@@ -12,10 +12,11 @@ constexpr double kMostRows = 65536.0;
 
 }  // namespace
 
-LaunchBudget::LaunchBudget(double milliseconds, DeviceType device)
+LaunchBudget::LaunchBudget(double milliseconds, DeviceType device, std::uint32_t first)
     : seconds_(1e-3 * (milliseconds >= 0            ? milliseconds
                        : device == DeviceType::kCpu ? 0.0
-                                                    : kDefault)) {}
+                                                    : kDefault)),
+      rows_(first) {}
 
 std::uint32_t LaunchBudget::rows(std::uint32_t left) {
   if (!bounded()) return left;

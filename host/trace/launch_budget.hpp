@@ -19,8 +19,12 @@ namespace raysplats {
 /// when they have run.
 class LaunchBudget {
  public:
-  /// `milliseconds` per launch; 0 = no bound, negative = none on CPUs and kDefault elsewhere.
-  LaunchBudget(double milliseconds, DeviceType device);
+  /// `milliseconds` per launch; 0 = no bound, negative = none on CPUs and kDefault elsewhere. The
+  /// first launch does `first` rows.
+  LaunchBudget(double milliseconds, DeviceType device, std::uint32_t first = kFirstRows);
+
+  /// Rows of any cost.
+  static constexpr std::uint32_t kFirstRows = 4;
 
   static constexpr double kDefault = 100.0;
   /// While somebody watches, where no other time bounds them.
@@ -49,7 +53,7 @@ class LaunchBudget {
 
   double seconds_;
   std::function<void(double)> watch_;
-  std::uint32_t rows_ = 4;
+  std::uint32_t rows_;
   bool settled_ = false;         // rows_ fits what a launch took, or all rows fit one
   std::deque<Launch> launches_;  // whose time is not known yet
 };

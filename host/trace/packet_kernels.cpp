@@ -43,6 +43,12 @@ std::vector<Kernel> PacketKernels::backward(const BuildOptions& build) {
   return {context_.kernel("trace/camera_backward.cl", "trace_backward", build)};
 }
 
+std::array<Kernel, 2> PacketKernels::segments(const BuildOptions& build) {
+  constexpr char kProgram[] = "trace/stream_segments.cl";
+  return {context_.kernel(kProgram, "list_segments", build),
+          context_.kernel(kProgram, "sum_segments", build)};
+}
+
 std::vector<Kernel> PacketKernels::group_kernels(const char* file,
                                                  const char* name,
                                                  const BuildOptions& build,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -38,6 +39,8 @@ class PacketKernels {
   std::vector<Kernel> forward(const BuildOptions& build);
   /// The same of trace_backward or trace_backward_group.
   std::vector<Kernel> backward(const BuildOptions& build);
+  /// What cuts streams into segments before trace_backward_group: list_segments and sum_segments.
+  std::array<Kernel, 2> segments(const BuildOptions& build);
 
   /// A work-item for every block x block packets, or a work-group for every packet, of a picture
   /// that is `width` pixels wide.

@@ -19,11 +19,13 @@
 #include "trace/candidate_lists.hpp"
 #include "trace/exact_sum.h"
 #include "trace/gradient_sums.hpp"
+#include "trace/hit_streams.hpp"
 #include "trace/memory_shares.hpp"
 #include "trace/packet_layout.hpp"
 #include "trace/ray_backward.hpp"
 #include "trace/ray_launch.hpp"
 #include "trace/ray_tree.hpp"
+#include "trace/stream_segments.hpp"
 #include "util/mebibytes.hpp"
 
 namespace raysplats {
@@ -87,7 +89,10 @@ std::size_t packet_bytes(const TrainOptions& options,
   const PacketLayout packet = packet_layout(device, options.trace);
   // Each hit in a row of its own (and those of packets that start again are few), and a quarter
   // more for views to come.
-  const std::size_t row = sizeof(std::uint32_t) * (2 + static_cast<std::size_t>(packet.lanes));
+  const std::size_t segment =
+      packet.grouped ? StreamSegments::chunk_bytes(packet.lanes) / HitStreams::kChunkRows : 0;
+  const std::size_t row =
+      sizeof(std::uint32_t) * (2 + static_cast<std::size_t>(packet.lanes)) + segment;
   const std::size_t hits = demand.pixels * static_cast<std::size_t>(options.trace.max_hits);
   // Tiles along the side of a square picture.
   const auto side = static_cast<std::size_t>(

@@ -18,6 +18,7 @@ ROWS = [
      "subgroup forward train 16: trace_forward_group"),
     ("`trace_backward_group` (atomic, the same)", 32, True, "subgroup backward atomic: trace_backward_group",
      "subgroup backward atomic 16: trace_backward_group"),
+    ("`sum_segments`", 32, False, "segments: sum_segments"),
     ("`trace_forward` (training)", 64, False, "forward train: trace_forward"),
     ("`trace_backward` (atomic)", 64, False, "backward atomic: trace_backward"),
     ("`trace_backward` (exact)", 64, False, "backward exact: trace_backward"),
