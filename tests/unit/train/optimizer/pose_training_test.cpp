@@ -79,11 +79,14 @@ TEST_CASE("disturbed poses of photos come back, and the model with them") {
     options.checkpoint_every = 0;
     options.poses = poses;
     Trainer trainer(context, dataset, options, folder.path() / name);
-    return trainer.run(false).evaluations.back().psnr;
+    return trainer.run(false).evaluations.back();
   };
-  const double best = train(clean, false, "clean");
-  const double worst = train(moved, false, "moved");
-  const double refined = train(moved, true, "refined");
+  const double best = train(clean, false, "clean").psnr;
+  const double worst = train(moved, false, "moved").psnr;
+  const auto row = train(moved, true, "refined");
+  const double refined = row.psnr;
+  REQUIRE(row.psnr_aligned);
+  const double aligned = *row.psnr_aligned;
 
   std::vector<Camera> cameras = read_cameras(folder.path() / "refined" / "cameras_refined.json");
   std::vector<double> turns, shifts;
@@ -97,12 +100,15 @@ TEST_CASE("disturbed poses of photos come back, and the model with them") {
     shifts.push_back(glm::distance(camera.center(), found->camera.center()) / extent);
   }
   CHECK(cameras.size() == clean.indices(Split::kTrain).size());
-  MESSAGE("clean " << best << " dB, disturbed " << worst << ", refined " << refined
-                   << "; median turn " << median(turns) << " degrees, shift "
+  MESSAGE("clean " << best << " dB, disturbed " << worst << ", refined " << refined << ", aligned "
+                   << aligned << "; median turn " << median(turns) << " degrees, shift "
                    << 100.0 * median(shifts) << " %");
   // Of six seeds: 0.35 to 0.80 dB below 33.3, 22.1 without; 0.11 to 0.13 degrees, where a pixel is
-  // 0.56, and 0.21 to 0.25 %.
+  // 0.56, and 0.21 to 0.25 %. Of three: 0.02 to 0.08 below where the views held out are aligned.
+  // What is left is no motion that all cameras share, which would be taken off: they turn after a
+  // model that moves.
   CHECK(refined > best - 1.0);
+  CHECK(aligned > best - 0.3);
   CHECK(refined > worst + 5.0);
   CHECK(median(turns) < 0.17);
   CHECK(median(shifts) < 0.003);
