@@ -8,7 +8,7 @@
 
 // Chunks of a segment, but of the nearest one of a stream, which has what is left.
 #define RS_SEGMENT_CHUNKS 16
-// Rows that may reach into a segment: all that are open at once, and those are numbered by bits.
+// Rows that may reach into a segment: as many as may be open at once (OPEN in cl/trace/group.h).
 #define RS_SEGMENT_REACHING 64
 // What stands for no segment, and for no slot.
 #define RS_NO_SEGMENT 0xffffffffu
@@ -33,7 +33,7 @@ typedef struct {
 } RsReachingRow;
 RS_STATIC_ASSERT_SIZE(RsReachingRow, 8);
 
-// Counts on the device: segments, slots, and from here on the rows that reach into each slot's.
+// Words that count segments, slots, and from RS_SEGMENT_COUNTS on what reaches into each slot's.
 #define RS_SEGMENT_COUNT 0
 #define RS_SEGMENT_SLOTS 1
 #define RS_SEGMENT_COUNTS 2

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// trace_backward_group: what trace_backward does, with a packet per work-group (group.h) and the
-// streams that trace_forward_group kept. The components of a line's gradient are summed over the
-// rays through local memory, or by the subgroup; one work-item adds one of them to the sums.
+// trace_backward_group: what trace_backward does, with packets that are work-groups (group.h) and
+// the streams that trace_forward_group kept. The components of a line's gradient are summed over
+// the rays through local memory, or by the subgroup; one work-item adds one of them to the sums.
 //   PRIVATE_COPIES 1: work-group g of `copies` takes every copies-th tile and adds to its own copy.
 //   otherwise:        a work-group per segment of a stream (stream_segments.cl).
 #ifndef TILE
@@ -15,6 +15,10 @@
 #endif
 
 #include "trace/stream_segment.h"
+
+#if (RS_SEGMENT_CHUNKS - 1) * (CHUNK - 1) < OPEN
+#error "The last segment of a stream has to be longer than all that is open there"
+#endif
 
 // Rows that reach into a segment and one work-item puts in order.
 #define RS_REACHING_EACH ((OPEN + GROUP - 1) / GROUP)
@@ -102,7 +106,7 @@ RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
 #endif
 }
 
-// The row of the slot is closed: whatever is still to come lies before it.
+// A row is closed: whatever is still to come lies in front of it.
 void close_hit(const float before, const float from_here, ClosedHit* closed) {
   if (before >= closed->before) {
     closed->before = before;
@@ -194,7 +198,9 @@ RS_GROUP_INLINE void hear_front(__local BackwardMemory* memory,
     const StreamHit hit = stream_hit(scene, p, rows.chunk * CHUNK + rows.n, lane);
     for (RowSet rest = open; rest != 0; rest &= rest - 1) {
       const uint slot = rs_first_slot(rest);
-      if (rs_row_get(memory->before, own->before, slot, lane) < hit.before) continue;
+      if (memory->oldest[slot] > rows.number ||
+          rs_row_get(memory->before, own->before, slot, lane) < hit.before)
+        continue;
       const float from_there = rs_row_get(memory->from_here, own->from_here, slot, lane);
       rs_row_set(memory->from_here, own->from_here, slot, lane, from_there + hit.share);
     }
@@ -202,8 +208,7 @@ RS_GROUP_INLINE void hear_front(__local BackwardMemory* memory,
   }
 }
 
-// `behind`: of the ray, the sum over all rows behind those to read but the ones that reach into
-// them.
+// `behind`: the ray's sum over all rows behind the segment, without those that reach into it.
 RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
                                     const int lane,
                                     const BackwardScene scene,
@@ -258,8 +263,9 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
       }
     }
     if (tied.before > 0.0f) next = tied;
-    // Others may still read of what a guest leaves. (There is room: the forward pass, too, takes no
-    // slot anew that has just become free.)
+    // Others may still read of what a guest leaves. There is room: where the row of this number was
+    // settled the forward pass had another slot free (group_open_row), but at the end of a stream,
+    // whose segment is longer than all that is open there.
     const uint slot = rs_first_slot(~(open | left));
     open |= RS_SLOT(slot);
     guests |= guest ? RS_SLOT(slot) : 0;
@@ -283,14 +289,6 @@ RS_GROUP_INLINE void group_backward(__local BackwardMemory* memory,
     close_row(memory, &own, lane, rs_first_slot(open), p, scene, &closed);
 }
 
-// Pixels of the packet at `corner`, a work-item its own.
-RS_GROUP_INLINE void load_group_pixels(Pixels* p,
-                                       const BackwardScene scene,
-                                       const int2 corner,
-                                       const int lane) {
-  load_pixels(p, scene, corner.x + lane % RS_GROUP_WIDTH, corner.y + lane / RS_GROUP_WIDTH);
-}
-
 #if PRIVATE_COPIES
 // The whole stream of a packet. `works`: whether there is a packet; otherwise nothing happens.
 RS_GROUP_INLINE void packet_backward(__local BackwardMemory* memory,
@@ -309,20 +307,20 @@ RS_GROUP_INLINE void packet_backward(__local BackwardMemory* memory,
   group_backward(memory, lane, scene, &p, rows, 0, 0.0f);
 }
 #else
-// Segment number `place`, if there is one and it is for this launch.
+// The segment of this group, if there is one and it is for this launch.
 RS_GROUP_INLINE void segment_backward(__local BackwardMemory* memory,
                                       const int lane,
-                                      const uint place,
                                       const BackwardScene scene,
                                       RS_SEGMENT_ARGUMENTS(const)) {
   RsStreamSegment segment = {0, RS_NO_CHUNK, 0, 0, 0, RS_NO_SEGMENT, RS_NO_SEGMENT, RS_NO_SEGMENT};
-  if (place < counts[RS_SEGMENT_COUNT]) segment = segments[place];
+  const uint place = segment_of_group(get_global_id(0) / GROUP, counts[RS_SEGMENT_COUNT], room);
+  if (place != RS_NO_SEGMENT) segment = segments[place];
   const bool mine =
       segment.chunk != RS_NO_CHUNK && ((segment.used & RS_STREAM_CROWDED) != 0) == (CROWDED != 0);
   Pixels p;
   load_group_pixels(&p, scene, packet_corner(scene.camera->width, segment.packet), lane);
-  RowsToRead rows = {0, segment.chunk, (segment.used & ~RS_STREAM_CROWDED) - 1,
-                     mine ? segment.rows : 0, segment.number};
+  RowsToRead rows = {0, mine ? segment.chunk : RS_NO_CHUNK, (segment.used & ~RS_STREAM_CROWDED) - 1,
+                     segment.rows, segment.number};
   const bool cut = mine && segment.slot != RS_NO_SEGMENT;
   float behind = 0.0f;
   if (cut) {
@@ -370,7 +368,6 @@ RS_GROUP_KERNEL __kernel void trace_backward_group(RS_BACKWARD_ARGUMENTS,
 #else
   (void)tiles;
   (void)face;
-  segment_backward(&memory, lane, get_global_id(0) / GROUP, scene, segments, counts, segment_sums,
-                   reaching);
+  segment_backward(&memory, lane, scene, room, segments, counts, segment_sums, reaching);
 #endif
 }

@@ -368,6 +368,7 @@ RS_GROUP_INLINE bool group_open_row(__local ForwardMemory* memory,
       before -= before * rs_row_get(rows->alpha, own->alpha, other, lane);
     }
   }
+  // (The backward pass counts on a free slot beside all that were open before: group_backward.cl.)
   const RowSet free = ~(progress->open | progress->closed);
   const bool fits = free != 0;
   const uint slot = fits ? rs_first_slot(free) : 0;

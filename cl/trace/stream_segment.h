@@ -14,12 +14,26 @@
 #include "trace/hit_stream.h"
 #include "trace/line_gradient.h"
 
-// The last row of every stream: a number that no window reaches below.
+#if OPEN > RS_SEGMENT_REACHING
+#error "More rows may be open than reach into a segment"
+#endif
+
+// Number of the last row of every stream, so high that no window reaches below 0.
 #define RS_LAST_NUMBER 0x80000000u
 
-#define RS_SEGMENT_ARGUMENTS(access)                                                         \
-  __global access RsStreamSegment *restrict segments, __global access uint *restrict counts, \
-      __global access float *restrict segment_sums, __global RsReachingRow *restrict reaching
+// Segments, of which there may be `room`, counts of them, and of each slot the sums of its segment,
+// a number for each ray, and the rows that reach into it.
+#define RS_SEGMENT_ARGUMENTS(access)                                                       \
+  const uint room, __global access RsStreamSegment *restrict segments,                     \
+      __global access uint *restrict counts, __global access float *restrict segment_sums, \
+      __global RsReachingRow *restrict reaching
+
+// The segment of group `group` of `room`, RS_NO_SEGMENT for most of them: the `count` that there
+// are are spread over all groups, so that each band of a launch has its share.
+uint segment_of_group(const uint group, const uint count, const uint room) {
+  const uint place = (uint)((ulong)group * count / room);
+  return (uint)((ulong)(group + 1) * count / room) > place ? place : RS_NO_SEGMENT;
+}
 
 // First pixel of a packet.
 int2 packet_corner(const int width, const uint packet) {
@@ -27,16 +41,24 @@ int2 packet_corner(const int width, const uint packet) {
   return (int2)((int)(packet % across) * RS_GROUP_WIDTH, (int)(packet / across) * RS_GROUP_HEIGHT);
 }
 
+// Of the packet at `corner`, a work-item its own pixel.
+RS_GROUP_INLINE void load_group_pixels(Pixels* p,
+                                       const BackwardScene scene,
+                                       const int2 corner,
+                                       const int lane) {
+  load_pixels(p, scene, corner.x + lane % RS_GROUP_WIDTH, corner.y + lane / RS_GROUP_WIDTH);
+}
+
 // The alpha of the Gaussian of line v in the packet's rays.
 float group_alpha(__global const float* v, const PacketMeeting* m) {
   return v[12] * rs_exp(-0.5f * m->numerator / m->direction2);
 }
 
-// A row of the pool: what its Gaussian blends into the ray, and with which transmittance in front.
+// A row of the pool and what its Gaussian does to a ray.
 typedef struct {
-  uint2 row;  // reference, window
-  float before;
-  float share;  // T alpha (colour . gradient)
+  uint2 row;     // reference, window
+  float before;  // transmittance in front, 0 in rays that do not blend it
+  float share;   // T alpha (colour . gradient)
 } StreamHit;
 
 RS_GROUP_INLINE StreamHit stream_hit(const BackwardScene scene,

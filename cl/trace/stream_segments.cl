@@ -12,7 +12,7 @@
 #include "trace/arguments.h"
 #include "trace/stream_segment.h"
 
-// Appends a segment that ends with `used` rows of `chunk`; returns the chunk in front of it.
+// Counts the rows of a segment whose last chunk is known; returns the chunk in front of it.
 uint list_segment(RsStreamSegment* segment, __global const uint2* pool) {
   uint chunk = segment->chunk;
   uint chunks = 0;
@@ -82,16 +82,15 @@ RS_GROUP_KERNEL __kernel void sum_segments(RS_VIEW_ARGUMENTS,
   const RsCamera camera = camera_argument;
   const RsBackward backward = backward_argument;
   const int lane = rs_group_lane();
-  const uint place = get_global_id(0) / GROUP;
-  if (place >= counts[RS_SEGMENT_COUNT]) return;
+  const uint place = segment_of_group(get_global_id(0) / GROUP, counts[RS_SEGMENT_COUNT], room);
+  if (place == RS_NO_SEGMENT) return;
   const RsStreamSegment segment = segments[place];
   if (segment.slot == RS_NO_SEGMENT) return;
   const BackwardScene scene =
       backward_scene(&camera, &backward, tangents, transmittances, stream_ends, pool,
                      pool_transmittance, lines, image_gradient, depth_gradient, 0);
-  const int2 corner = packet_corner(camera.width, segment.packet);
   Pixels p;
-  load_pixels(&p, scene, corner.x + lane % RS_GROUP_WIDTH, corner.y + lane / RS_GROUP_WIDTH);
+  load_group_pixels(&p, scene, packet_corner(camera.width, segment.packet), lane);
   const uint first = segment.number - segment.rows + 1;
   uint number = segment.number;
   uint chunk = segment.chunk, used = segment.used & ~RS_STREAM_CROWDED;

@@ -19,12 +19,13 @@ namespace {
 
 const std::vector<int> kFront{0};
 
-// Groups of the first launch by segments, none of which has many rows: a view of 500 x 500 pixels,
-// say, takes one launch from the start.
+// Groups of the first launch by segments, none of which has many rows: a view of 400 x 400 pixels,
+// say, takes one launch from the start. Who asks for a time of launches may ask for little.
 constexpr std::uint32_t kFirstSegments = 8192;
 
 LaunchBudget segment_budget(const TraceOptions& options, const DeviceInfo& device) {
-  return {options.launch_budget_ms, device.type, kFirstSegments};
+  const bool own = options.launch_budget_ms > 0;
+  return {options.launch_budget_ms, device.type, own ? LaunchBudget::kFirstRows : kFirstSegments};
 }
 
 TraceOptions checked(const TraceOptions& options) {

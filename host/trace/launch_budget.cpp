@@ -32,7 +32,7 @@ std::uint32_t LaunchBudget::rows(std::uint32_t left) {
 void LaunchBudget::record(std::uint32_t rows, double seconds) {
   const double fit = seconds > 0 ? rows * limit() / seconds : kMostRows;
   const double most = std::min(kMostGrowth * rows, kMostRows);
-  settled_ = settled_ || fit <= most;
+  settled_ = settled_ || fit <= most || most == kMostRows;
   const auto size = static_cast<std::uint32_t>(std::clamp(fit, 1.0, most));
   if (seconds > limit()) {
     rows_ = std::min(rows_, size);

@@ -12,18 +12,18 @@
 
 namespace raysplats {
 
-/// How many rows (of tiles, or of rays) one launch may do, so that it ends within a time: the
-/// watchdogs of GPUs that also draw a screen stop kernels after some seconds, and a long kernel
-/// freezes the screen. The size follows the times of the launches before, by the device's clock:
-/// the first ones are waited for until one took the time that it should, the others are looked at
-/// when they have run.
+/// How many rows (of tiles, or groups of rays or of segments) one launch may do, so that it ends
+/// within a time: the watchdogs of GPUs that also draw a screen stop kernels after some seconds,
+/// and a long kernel freezes the screen. The size follows the times of the launches before, by the
+/// device's clock: the first ones are waited for until one took the time that it should, the others
+/// are looked at when they have run.
 class LaunchBudget {
  public:
   /// `milliseconds` per launch; 0 = no bound, negative = none on CPUs and kDefault elsewhere. The
   /// first launch does `first` rows.
   LaunchBudget(double milliseconds, DeviceType device, std::uint32_t first = kFirstRows);
 
-  /// Rows of any cost.
+  /// Where nothing is known of what a row costs.
   static constexpr std::uint32_t kFirstRows = 4;
 
   static constexpr double kDefault = 100.0;

@@ -26,7 +26,7 @@ class MemoryShares {
   /// one.
   std::size_t all() const { return budget_; }
 
-  /// Hits kept for the backward pass.
+  /// Hits kept for the backward pass, and their segments.
   std::size_t hit_streams() const { return budget_ / 2; }
   std::size_t tile_lists() const { return budget_ / 4; }
   /// Private copies of line gradients.

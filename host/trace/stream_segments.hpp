@@ -23,12 +23,12 @@ class StreamSegments {
   /// Room for the segments of `packets` whose streams have `chunks` together. None are listed.
   void prepare(std::size_t packets, std::size_t chunks);
   /// The most segments that there may be.
-  std::size_t room() const { return segments_.size(); }
+  std::uint32_t room() const { return static_cast<std::uint32_t>(segments_.size()); }
 
   const Buffer<RsStreamSegment>& segments() const { return segments_; }
   const Buffer<std::uint32_t>& counts() const { return counts_; }
   /// RS_SEGMENT_ARGUMENTS of cl/trace/stream_segment.h.
-  auto arguments() const { return argument_pack(segments_, counts_, sums_, reaching_); }
+  auto arguments() const { return argument_pack(room(), segments_, counts_, sums_, reaching_); }
 
  private:
   Context& context_;

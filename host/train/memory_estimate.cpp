@@ -89,10 +89,10 @@ std::size_t packet_bytes(const TrainOptions& options,
   const PacketLayout packet = packet_layout(device, options.trace);
   // Each hit in a row of its own (and those of packets that start again are few), and a quarter
   // more for views to come.
-  const std::size_t segment =
+  const std::size_t beside =
       packet.grouped ? StreamSegments::chunk_bytes(packet.lanes) / HitStreams::kChunkRows : 0;
   const std::size_t row =
-      sizeof(std::uint32_t) * (2 + static_cast<std::size_t>(packet.lanes)) + segment;
+      sizeof(std::uint32_t) * (2 + static_cast<std::size_t>(packet.lanes)) + beside;
   const std::size_t hits = demand.pixels * static_cast<std::size_t>(options.trace.max_hits);
   // Tiles along the side of a square picture.
   const auto side = static_cast<std::size_t>(

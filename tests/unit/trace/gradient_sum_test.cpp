@@ -217,7 +217,7 @@ TEST_CASE("every way of adding gradients gives the same, and all but atomics the
       TraceOptions variant = options;
       variant.gradient_sum = sum;
       CHECK(trace_view(context, model, variant) == base);
-      // Bands of one row of tiles each: no launch is this short.
+      // Bands of one row of tiles, or a few segments, each: no launch is this short.
       variant.launch_budget_ms = 1e-6;
       CHECK(trace_view(context, model, variant) == base);
       variant.launch_budget_ms = 1e6;
@@ -282,6 +282,8 @@ TEST_CASE("a budget of time sizes launches by what they took") {
   CHECK(off.rows(50) == 50);
   CHECK(!LaunchBudget(-1, DeviceType::kCpu).bounded());
   CHECK(LaunchBudget(-1, DeviceType::kGpu).bounded());
+
+  CHECK(LaunchBudget(100, DeviceType::kCpu, 500).rows(5000) == 500);
 
   LaunchBudget budget(100, DeviceType::kCpu);
   CHECK(budget.rows(2) == 2);

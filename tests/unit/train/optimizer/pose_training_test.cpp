@@ -105,8 +105,8 @@ TEST_CASE("disturbed poses of photos come back, and the model with them") {
                    << 100.0 * median(shifts) << " %");
   // Of six seeds: 0.35 to 0.80 dB below 33.3, 22.1 without; 0.11 to 0.13 degrees, where a pixel is
   // 0.56, and 0.21 to 0.25 %. Of three: 0.02 to 0.08 below where the views held out are aligned.
-  // What is left is no motion that all cameras share, which would be taken off: they turn after a
-  // model that moves.
+  // So the model is sharp, and it and its cameras have moved together by what no common motion
+  // takes off.
   CHECK(refined > best - 1.0);
   CHECK(aligned > best - 0.3);
   CHECK(refined > worst + 5.0);
