@@ -123,7 +123,7 @@ KernelWork forward_work(const ExecutedCounts& c, bool keep) {
   const double lists = (RS_WORK_FORWARD_CANDIDATE_BYTES - kLine) * c.candidates;
   out = out + moved(lists + RS_WORK_FORWARD_PIXEL_BYTES * c.pixels + (keep ? c.stream_bytes : 0),
                     lists + (keep ? c.stream_bytes : 0));
-  out.launches = out.shared = 1;
+  out.launches = out.shared = c.grouped ? 2 : 1;
   return out;
 }
 
