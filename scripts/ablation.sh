@@ -80,6 +80,8 @@ out=${places[1]}
 for axis in ${axes//,/ }; do
   [[ -n ${values[$axis]:-} ]] || fail "there is no axis $axis, see --help"
 done
+# Before anything is measured.
+python=$("$root/scripts/bench/plotting_python.sh")
 
 # Runs of other settings would not be comparable.
 mkdir -p "$out/runs"
@@ -125,8 +127,6 @@ for axis in ${axes//,/ }; do
   done
 done
 
-python=${PYTHON:-python3}
-"$python" -c 'import matplotlib' 2>/dev/null || python=/usr/bin/python3
 "$python" "$root/scripts/bench/plot.py" ablation "$out"
 if ((${#failed[@]} > 0)); then
   printf '== Failed: %s\n' "${failed[*]}" >&2

@@ -63,6 +63,8 @@ if [[ ! -x $raysplats ]]; then
   echo "growth.sh: $raysplats does not exist, build it with scripts/setup.sh or name it with --raysplats" >&2
   exit 1
 fi
+# Before anything is measured.
+python=$("$root/scripts/bench/plotting_python.sh")
 mkdir -p "$out"
 
 # measure SIZE SIDE
@@ -80,6 +82,4 @@ measure() {
 for size in ${sizes//,/ }; do measure "$size" 800; done
 for side in ${sides//,/ }; do measure "$pixels_at" "$side"; done
 
-python=${PYTHON:-python3}
-"$python" -c 'import matplotlib' 2>/dev/null || python=/usr/bin/python3
 "$python" "$root/scripts/bench/plot.py" growth "$out"
