@@ -193,7 +193,7 @@ void warn_of_views(const std::vector<Json>& views,
   warn("Training photos less sharp than the others, which blur the model: ", blurred(photos));
   warn(
       "Training photos that the model comes far less near to than to the others; their pose or "
-      "exposure may be wrong, or something in them has moved: ",
+      "exposure may be wrong, few others show what they do, or something in them has moved: ",
       odd(photos, settled ? 1.0 : kTimesBefore));
 }
 

@@ -287,8 +287,9 @@ void add_optimiser_options(TrainTable& t, TrainOptions& o) {
   t.section("Optimiser (Adam)");
   t.number(
       "position-lr", o.position_lr.initial, kFitted, 1e3,
-      "learning rate of the means, times the scene extent (through telephoto lenses at most 2.5 "
-      "times what they see across); -1 = 0.0005, or 0.002 after a random start (not mcmc)");
+      "learning rate of the means, times the scene extent (at most 2.5 times what telephoto lenses "
+      "see across, and 1.5 times how far away the nearest parts of the scene are); -1 = 0.0005, or "
+      "0.002 after a random start (not mcmc)");
   t.fitted_end("position-lr", o.position_lr, "0.00032 / sqrt(iterations), from 5e-6 to 2e-5");
   t.number("rotation-lr", o.rotation_lr.initial, 0, 1e3, "learning rate of the quaternions");
   t.fitted_end("rotation-lr", o.rotation_lr, "0.095 / sqrt(iterations), from 0.001 to 0.003");

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <compare>
 
 #include "scene/gaussians/gaussian_selection.hpp"
 #include "util/parallel.hpp"
@@ -20,7 +19,9 @@ struct Place {
   std::uint64_t code;
   std::uint32_t index;
 
-  auto operator<=>(const Place&) const = default;
+  bool operator<(const Place& other) const {
+    return code != other.code ? code < other.code : index < other.index;
+  }
 };
 
 // Spreads the lowest 21 bits so that two zeros follow each.

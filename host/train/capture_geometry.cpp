@@ -2,6 +2,7 @@
 #include "train/capture_geometry.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -10,10 +11,12 @@
 #include <optional>
 #include <utility>
 
+#include "scene/camera/camera_model.hpp"
 #include "scene/camera/orbit.hpp"
 #include "scene/camera/view_axes.hpp"
 #include "scene/even_choice.hpp"
 #include "scene/statistics.hpp"
+#include "util/parallel.hpp"
 
 namespace raysplats {
 namespace {
@@ -159,9 +162,39 @@ Region visible_region(std::span<const Camera> all, double extent) {
   return {target, *middle};
 }
 
-double motion_extent(std::span<const Camera> cameras, double extent) {
+std::optional<double> near_distance(std::span<const Camera> cameras,
+                                    std::span<const float> points) {
+  constexpr std::size_t kMostCameras = 50, kMostPoints = 20000;
+  constexpr std::size_t kLeastSeen = 20;  // points, of which one is the near one
+  constexpr double kNearShare = 0.05;
+  const std::vector<std::size_t> asked = even_choice(cameras.size(), kMostCameras);
+  const std::vector<std::size_t> chosen = even_choice(points.size() / 3, kMostPoints);
+  std::vector<double> nearest(asked.size(), 0.0);
+  in_parallel(asked.size(), [&](std::size_t i) {
+    const Camera& camera = cameras[asked[i]];
+    if (camera.model == CameraModel::kOrthographic) return;  // which is at no distance
+    std::vector<double> distances;
+    for (const std::size_t k : chosen) {
+      const glm::dvec3 point(points[3 * k], points[3 * k + 1], points[3 * k + 2]);
+      const std::optional<glm::dvec2> at = project(camera, point);
+      if (at && at->x >= 0 && at->x < camera.width && at->y >= 0 && at->y < camera.height)
+        distances.push_back(glm::distance(point, camera.center()));
+    }
+    if (distances.size() >= kLeastSeen)
+      nearest[i] = quantiles(std::move(distances), std::array{kNearShare})[0];
+  });
+  std::erase(nearest, 0.0);
+  if (nearest.empty() || 2 * nearest.size() < asked.size()) return std::nullopt;
+  return median(std::move(nearest));
+}
+
+double motion_extent(std::span<const Camera> cameras, double extent, std::span<const float> means) {
   constexpr double kMostHalves = 5.0;  // usual lenses have 0.5 to 4.7
-  return std::min(extent, kMostHalves * visible_region(cameras, extent).half_side);
+  constexpr double kMostNear = 1.5;    // captures of one subject have 0.4 to 1.8
+  double out = std::min(extent, kMostHalves * visible_region(cameras, extent).half_side);
+  if (const std::optional<double> near = near_distance(cameras, means))
+    out = std::min(out, kMostNear * *near);
+  return out;
 }
 
 bool look_elsewhere(std::span<const Camera> held_out, std::span<const Camera> trained) {

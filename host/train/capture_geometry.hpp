@@ -2,6 +2,7 @@
 #pragma once
 
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -38,10 +39,19 @@ struct Region {
 /// cube of three scene extents about the mean camera centre. Stray cameras have no say.
 Region visible_region(std::span<const Camera> cameras, double extent);
 
-/// What the learning rate of the means is relative to: the scene extent, or five times half of what
-/// the median camera sees across at the point that most look at, where that is less. Telephoto
-/// lenses stand far apart around something small, which steps by their distance would tear apart.
-double motion_extent(std::span<const Camera> cameras, double extent);
+/// How near what the cameras see comes to them: the median over cameras of the distance that a
+/// twentieth of the points in a picture (3 N numbers) are nearer than. Nothing where less than half
+/// of the cameras see some. Of many cameras and points some, evenly spread, are looked at.
+std::optional<double> near_distance(std::span<const Camera> cameras, std::span<const float> points);
+
+/// What the learning rate of the means is relative to, of a model that begins at `means`: the least
+/// of
+/// * the scene extent;
+/// * five times half of what the median camera sees across at the point that most look at:
+/// telephoto
+///   lenses stand far apart around something small, which steps by their distance would tear apart;
+/// * one and a half times near_distance(): so do walks and flights past what is near them.
+double motion_extent(std::span<const Camera> cameras, double extent, std::span<const float> means);
 
 /// Whether the held-out cameras look where the trained ones do not, although these look where
 /// others of them do: the median angle from a held-out axis to the nearest trained one is above 15

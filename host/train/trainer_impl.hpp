@@ -210,7 +210,7 @@ struct Trainer::Impl {
   nlohmann::json photo_report() const;
   void write_metrics(bool complete);
   std::string capped_share(std::uint64_t capped);
-  void warn_of_capped_rays(std::uint64_t capped) const;
+  void tell_of_capped_rays(std::uint64_t capped) const;
   void warn_of_no_progress() const;
 
   // trainer_resume.cpp: checkpoints.
@@ -256,7 +256,7 @@ struct Trainer::Impl {
   std::vector<std::size_t> test_views;
   std::vector<Camera> train_cameras;
   double extent;
-  double motion;  // motion_extent()
+  float motion = 0;  // motion_extent() of the first model
   bool cut_out;
   std::string command;  ///< that started the run
   std::string fingerprint;

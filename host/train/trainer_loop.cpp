@@ -237,7 +237,7 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   if (over) keep_best_model();
   write_metrics(over);
   if (const std::uint64_t capped = guard.counts().capped_rays; capped > 0)
-    warn_of_capped_rays(capped);
+    tell_of_capped_rays(capped);
   if (complete) warn_of_no_progress();
   if (const auto best = better_before(run.evaluations(), options.exposure)) {
     spdlog::warn(

@@ -83,16 +83,18 @@ std::string Trainer::Impl::capped_share(std::uint64_t capped) {
   const double share = static_cast<double>(capped) / static_cast<double>(traced_rays);
   if (share >= kManyCapped && !cap_reported) {
     cap_reported = true;
-    warn_of_capped_rays(capped);
+    tell_of_capped_rays(capped);
   }
   return fmt::format(", {:.2g} % of rays capped", 100.0 * share);
 }
 
-void Trainer::Impl::warn_of_capped_rays(std::uint64_t capped) const {
-  spdlog::warn(
-      "iteration {}: {} of {} rays traced so far stopped at --max-hits {} and miss what lies "
-      "behind: raise it",
-      iteration, capped, traced_rays, options.trace.max_hits);
+// A handful is nothing that a user has to mend.
+void Trainer::Impl::tell_of_capped_rays(std::uint64_t capped) const {
+  const bool many = static_cast<double>(capped) >= kManyCapped * static_cast<double>(traced_rays);
+  spdlog::log(many ? spdlog::level::warn : spdlog::level::info,
+              "iteration {}: {} of {} rays traced so far stopped at --max-hits {} and miss what lies "
+              "behind{}",
+              iteration, capped, traced_rays, options.trace.max_hits, many ? ": raise it" : "");
 }
 
 // Warns when no picture came nearer to its photo.

@@ -80,6 +80,7 @@ void Trainer::Impl::write_state(const std::filesystem::path& path) {
     add("sky.steps", std::move(moments.steps));
   }
   if (exposure) add("exposure", exposure->deltas());
+  add("motion", {motion});
   write_checkpoint(path, checkpoint, sections);
 }
 
@@ -296,6 +297,10 @@ void Trainer::Impl::restore_parts(const Checkpoint& checkpoint) {
     const auto found = checkpoint.sections.find(name);
     return found == checkpoint.sections.end() ? std::vector<float>() : found->second;
   };
+  const std::vector<float> unit = part("motion");
+  // Versions that have none did not look at the points.
+  motion =
+      unit.size() == 1 ? unit[0] : static_cast<float>(motion_extent(train_cameras, extent, {}));
   if (poses)
     poses->restore({part("poses"), part("poses.first"), part("poses.second"), part("poses.steps")});
   if (exposure) exposure->restore(part("exposure"));

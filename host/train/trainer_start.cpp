@@ -421,6 +421,8 @@ void Trainer::Impl::upload_first_model(std::size_t most) {
   first_model.reset();
   check_room(model.size(), most);
   if (options.flat) face_cameras(model, train_cameras);
+  motion = static_cast<float>(motion_extent(train_cameras, extent, model.means));
+  spdlog::debug("means move in units of {:.4g}, the cameras' extent is {:.4g}", motion, extent);
   gaussians = DeviceGaussians::upload(context, gathered(model, morton_order(model.means)),
                                       options.scale_activation);
   adam.initialize(gaussians.count, gaussians.sh_degree);

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -20,7 +21,7 @@ Region region_of(std::span<const Camera> cameras) {
 }
 
 double motion_of(std::span<const Camera> cameras) {
-  return motion_extent(cameras, camera_extent(cameras));
+  return motion_extent(cameras, camera_extent(cameras), {});
 }
 
 }  // namespace
@@ -60,10 +61,49 @@ TEST_CASE("means move by what cameras see where these stand far away, else by th
   for (Camera& camera : telephoto) camera.fx = camera.fy = 10 * camera.fx;
   CHECK(motion_of(telephoto) == doctest::Approx(5 * region_of(usual).half_side));
   CHECK(camera_extent(telephoto) == doctest::Approx(44.0));
-  // Without a common target nothing says what they look at.
+  // Without a common target the cameras do not say what they look at.
   for (Camera& camera : telephoto)
     camera.translation = -(camera.rotation * (2.0 * target - camera.center()));
   CHECK(motion_of(telephoto) == camera_extent(telephoto));
+}
+
+TEST_CASE("means move by what is near where cameras travel farther, in any unit") {
+  for (const double unit : {1e-3, 1.0, 1e5}) {
+    CAPTURE(unit);
+    // A wall at the distance 4, dotted every 0.05 along and up, before which cameras walk by 100.
+    std::vector<float> wall;
+    for (int i = 0; i <= 2400; ++i) {
+      for (int k = -5; k <= 5; ++k) {
+        for (const double value : {0.05 * i - 10, 4.0, 0.2 * k})
+          wall.push_back(static_cast<float>(unit * value));
+      }
+    }
+    std::vector<Camera> walk;
+    for (int i = 0; i <= 50; ++i) {
+      const glm::dvec3 place(2.0 * unit * i, 0, 0);
+      walk.push_back(look_at(place, place + glm::dvec3(0, 1, 0), {0, 0, 1}, 80, 80, 80));
+    }
+    const std::optional<double> near = near_distance(walk, wall);
+    REQUIRE(near);
+    CHECK(*near == doctest::Approx(4 * unit).epsilon(0.02));
+    const double extent = camera_extent(walk);
+    CHECK(extent == doctest::Approx(55 * unit));
+    CHECK(motion_extent(walk, extent, wall) == doctest::Approx(1.5 * *near));
+    // A twentieth of what is seen may be nearer, and what no picture shows does not count.
+    std::vector<float> more = wall;
+    for (int i = 0; i <= 2400; ++i) {
+      for (const double value : {0.05 * i - 10, i % 5 == 0 ? 1.0 : -1.0, 0.0})
+        more.push_back(static_cast<float>(unit * value));
+    }
+    CHECK(*near_distance(walk, more) == doctest::Approx(*near).epsilon(0.02));
+    // Seen from the middle of a ring, whose cameras are as far from the wall as from each other.
+    const std::vector<Camera> around = ring(12, 4 * unit, unit * glm::dvec3(50, 4, 0));
+    CHECK(motion_extent(around, camera_extent(around), {}) == camera_extent(around));
+    // Where most cameras see nothing, nothing is known.
+    CHECK(!near_distance(walk, std::span(wall).first(wall.size() / 4)));
+    CHECK(!near_distance(walk, {}));
+    CHECK(!near_distance({}, wall));
+  }
 }
 
 TEST_CASE("held-out cameras look elsewhere where counting holds out one lens of a rig") {
@@ -146,7 +186,7 @@ TEST_CASE("cameras in one place count lengths by what they see, in any unit") {
       const double extent = scene_extent(cameras, points);
       CHECK(extent == doctest::Approx(5 * unit).epsilon(0.01));
       // Their axes meet where they stand, which is nothing that they look at.
-      CHECK(motion_extent(cameras, extent) == extent);
+      CHECK(motion_extent(cameras, extent, {}) == extent);
       CHECK(visible_region(cameras, extent).half_side == doctest::Approx(3 * extent));
     }
     CHECK(scene_extent(std::vector<Camera>{cameras[0]}, points) ==
