@@ -61,6 +61,14 @@ bool has_number(const bool general, const int k) {
   return general || k < RS_PROJECTIVE_END || k >= 12;
 }
 
+#if SUBGROUP
+// The sum of number k over the subgroup, for the work-item that adds it.
+RS_GROUP_INLINE void sum_number(const int lane, const int k, const float* g, float* mine) {
+  const float sum = sub_group_reduce_add(g[k]);
+  if (lane == k % GROUP) mine[k / GROUP] = sum;
+}
+#endif
+
 // Adds the sums of g over the group to the line of `reference`.
 RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
                                     const int lane,
@@ -74,9 +82,12 @@ RS_GROUP_INLINE void group_add_line(__local BackwardMemory* memory,
   float mine[RS_SUM_EACH];
 #pragma unroll
   for (int k = 0; k < 16; ++k) {
-    if (!has_number(general, k)) continue;
-    const float sum = sub_group_reduce_add(g[k]);
-    if (lane == k % GROUP) mine[k / GROUP] = sum;
+    if (has_number(false, k)) sum_number(lane, k, g, mine);
+  }
+  // Last: of sums behind such a branch PoCL 6.0 loses the first.
+  if (general) {
+#pragma unroll
+    for (int k = RS_PROJECTIVE_END; k < 12; ++k) sum_number(lane, k, g, mine);
   }
 #pragma unroll
   for (int i = 0; i < RS_SUM_EACH; ++i) {
