@@ -165,7 +165,7 @@ Region visible_region(std::span<const Camera> all, double extent) {
 std::optional<double> near_distance(std::span<const Camera> cameras,
                                     std::span<const float> points) {
   constexpr std::size_t kMostCameras = 50, kMostPoints = 20000;
-  constexpr std::size_t kLeastSeen = 20;  // points, of which one is the near one
+  constexpr std::size_t kLeastSeen = 5;  // points; the nearest of few is near enough to a twentieth
   constexpr double kNearShare = 0.05;
   const std::vector<std::size_t> asked = even_choice(cameras.size(), kMostCameras);
   const std::vector<std::size_t> chosen = even_choice(points.size() / 3, kMostPoints);

@@ -47,10 +47,9 @@ std::optional<double> near_distance(std::span<const Camera> cameras, std::span<c
 /// What the learning rate of the means is relative to, of a model that begins at `means`: the least
 /// of
 /// * the scene extent;
-/// * five times half of what the median camera sees across at the point that most look at:
-/// telephoto
-///   lenses stand far apart around something small, which steps by their distance would tear apart;
-/// * one and a half times near_distance(): so do walks and flights past what is near them.
+/// * five times half of what the median camera sees across at the point that most look at, as
+///   telephoto lenses stand far apart around something small, which steps by that would tear apart;
+/// * one and a half times near_distance(): walks and flights go far past what is near them.
 double motion_extent(std::span<const Camera> cameras, double extent, std::span<const float> means);
 
 /// Whether the held-out cameras look where the trained ones do not, although these look where

@@ -5,11 +5,13 @@
 #include <cmath>
 #include <cstddef>
 #include <glm/vec3.hpp>
+#include <string>
 #include <vector>
 
 #include "raysplats/dataset.hpp"
 #include "raysplats/gaussians.hpp"
 #include "raysplats/trainer.hpp"
+#include "run/checkpoint.hpp"
 #include "train/capture_geometry.hpp"
 #include "unit/fixture.hpp"
 #include "unit/train/photographed.hpp"
@@ -42,15 +44,21 @@ std::vector<Camera> walk() {
   return out;
 }
 
+/// Photos of the hedge along the walk, and points that miss it by a little.
+struct Walk : Photographed {
+  Walk() : Photographed(hedge(), walk()) {
+    CounterRng rng(5, 2);
+    for (const float position : hedge().means) {
+      dataset.points.positions.push_back(position + static_cast<float>(0.05 * rng.normal()));
+      dataset.points.colors.push_back(0.5f);
+    }
+  }
+};
+
 }  // namespace
 
 TEST_CASE("a long walk is learned in steps by what is near it, whatever its length") {
-  Photographed data(hedge(), walk());
-  CounterRng rng(5, 2);
-  for (const float position : hedge().means) {
-    data.dataset.points.positions.push_back(position + static_cast<float>(0.05 * rng.normal()));
-    data.dataset.points.colors.push_back(0.5f);
-  }
+  const Walk data;
   const std::vector<Camera> cameras = walk();
   const double extent = camera_extent(cameras);
   const double motion = motion_extent(cameras, extent, data.dataset.points.positions);
@@ -68,4 +76,19 @@ TEST_CASE("a long walk is learned in steps by what is near it, whatever its leng
   const double usual = trained(1), by_spread = trained(extent / motion);
   MESSAGE("by what is near " << usual << " dB, by the cameras' spread " << by_spread << " dB");
   CHECK(usual > by_spread + 1);
+}
+
+TEST_CASE("a long walk that is resumed goes on in the same steps") {
+  const Walk data;
+  TrainOptions options = short_training(20);
+  options.init = "colmap";
+  options.trace.deterministic = true;
+  options.checkpoint_every = 10;
+  options.keep_checkpoints = 9;
+  Trainer straight(shared_test_context(), data.dataset, options, data.folder / "straight");
+  straight.run(false);
+  Trainer resumed(shared_test_context(), data.dataset, options, data.folder / "resumed");
+  resumed.resume(checkpoint_path(data.folder / "straight", 10));
+  resumed.run(false);
+  check_equal(straight.model(), resumed.model());
 }
