@@ -65,13 +65,6 @@ Cells cells_along(std::span<const float> positions, std::size_t axis) {
   return {low, high > low ? kCells / (high - low) : 0.0};
 }
 
-// Calls work(begin, end) for chunks that make up 0..count, on all cores.
-template <class Work>
-void in_chunks(std::size_t count, std::size_t chunk, const Work& work) {
-  in_parallel((count + chunk - 1) / chunk,
-              [&](std::size_t i) { work(i * chunk, std::min(count, (i + 1) * chunk)); });
-}
-
 // Chunks one beside the other, which are then merged in pairs.
 void sort_places(std::vector<Place>& places) {
   const auto at = [&places](std::size_t i) {

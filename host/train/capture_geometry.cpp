@@ -176,9 +176,7 @@ std::optional<double> near_distance(std::span<const Camera> cameras,
     std::vector<double> distances;
     for (const std::size_t k : chosen) {
       const glm::dvec3 point(points[3 * k], points[3 * k + 1], points[3 * k + 2]);
-      const std::optional<glm::dvec2> at = project(camera, point);
-      if (at && at->x >= 0 && at->x < camera.width && at->y >= 0 && at->y < camera.height)
-        distances.push_back(glm::distance(point, camera.center()));
+      if (project_into(camera, point)) distances.push_back(glm::distance(point, camera.center()));
     }
     if (distances.size() >= kLeastSeen)
       nearest[i] = quantiles(std::move(distances), std::array{kNearShare})[0];

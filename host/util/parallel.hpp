@@ -35,4 +35,12 @@ void in_parallel(std::size_t count, const Work& work) {
   if (first != failures.end() && first->second) std::rethrow_exception(first->second);
 }
 
+/// Calls work(begin, end) for chunks of that many that make up 0 to `count`, on all cores; the last
+/// one may be shorter.
+template <class Work>
+void in_chunks(std::size_t count, std::size_t chunk, const Work& work) {
+  in_parallel((count + chunk - 1) / chunk,
+              [&](std::size_t i) { work(i * chunk, std::min(count, (i + 1) * chunk)); });
+}
+
 }  // namespace raysplats

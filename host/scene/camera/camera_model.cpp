@@ -239,4 +239,11 @@ std::optional<glm::dvec2> project(const Camera& camera, const glm::dvec3& world)
   return std::nullopt;
 }
 
+std::optional<glm::dvec2> project_into(const Camera& camera, const glm::dvec3& world) {
+  const std::optional<glm::dvec2> point = project(camera, world);
+  const bool inside = point && point->x >= 0 && point->x < camera.width && point->y >= 0 &&
+                      point->y < camera.height;
+  return inside ? point : std::nullopt;
+}
+
 }  // namespace raysplats

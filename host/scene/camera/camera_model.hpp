@@ -28,6 +28,8 @@ CameraRay camera_ray(const Camera& camera, double px, double py);
 /// The image point at which a world point is seen, possibly outside the picture; nothing where the
 /// camera cannot see it at all (behind a pinhole, beyond lens_limit(), at the very centre).
 std::optional<glm::dvec2> project(const Camera& camera, const glm::dvec3& world);
+/// The same where it lies in the picture; nothing elsewhere.
+std::optional<glm::dvec2> project_into(const Camera& camera, const glm::dvec3& world);
 
 /// Makes the camera a panorama with the intrinsics that nerfstudio gives one.
 void set_equirectangular(Camera& camera);

@@ -108,14 +108,6 @@ std::vector<std::size_t> best_cuts(const Sums& sums,
   return out;
 }
 
-/// Calls work(begin, end) for all chunks of 0 to count, on several threads.
-void for_chunks(std::size_t count, const std::function<void(std::size_t, std::size_t)>& work) {
-  const std::size_t chunks = (count + kChunk - 1) / kChunk;
-  in_parallel(chunks, [&](std::size_t chunk) {
-    work(chunk * kChunk, std::min(count, (chunk + 1) * kChunk));
-  });
-}
-
 /// k-means over some of many vectors.
 class Clusters {
  public:
@@ -164,7 +156,7 @@ class Clusters {
     if (members.size() * count_ < kChunk * kChunk) {
       work(0, members.size());
     } else {
-      for_chunks(members.size(), work);
+      in_chunks(members.size(), kChunk, work);
     }
   }
 

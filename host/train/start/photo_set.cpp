@@ -95,12 +95,7 @@ bool SmallPhoto::known(const glm::dvec2& point) const {
 }
 
 std::optional<glm::dvec2> SmallPhoto::sees(const glm::dvec3& world) const {
-  const std::optional<glm::dvec2> point = project(camera, world);
-  if (!point ||
-      !(point->x >= 0 && point->x < camera.width && point->y >= 0 && point->y < camera.height)) {
-    return std::nullopt;
-  }
-  return point;
+  return project_into(camera, world);
 }
 
 std::vector<SmallPhoto> load_small_photos(const Dataset& dataset,

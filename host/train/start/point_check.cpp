@@ -41,12 +41,6 @@ glm::dvec3 triple(const std::vector<float>& values, std::size_t i) {
   return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
 }
 
-bool sees(const Camera& camera, const glm::dvec3& world) {
-  const std::optional<glm::dvec2> point = project(camera, world);
-  return point && point->x >= 0 && point->y >= 0 && point->x < camera.width &&
-         point->y < camera.height;
-}
-
 // Square cells of a photo, as far as they lie inside.
 class Cells {
  public:
@@ -207,10 +201,11 @@ double seen_share(const std::vector<float>& positions, std::span<const Camera> c
   std::size_t seen = 0;
   for (const std::size_t i : chosen) {
     const glm::dvec3 world = triple(positions, i);
-    seen += std::any_of(cameras.begin(), cameras.end(),
-                        [&](const Camera& camera) { return sees(camera, world); })
-                ? 1
-                : 0;
+    seen +=
+        std::any_of(cameras.begin(), cameras.end(),
+                    [&](const Camera& camera) { return project_into(camera, world).has_value(); })
+            ? 1
+            : 0;
   }
   return static_cast<double>(seen) / static_cast<double>(chosen.size());
 }
@@ -240,8 +235,9 @@ PointCloud seen_points(const PointCloud& points, std::span<const Camera> cameras
   std::vector<std::uint8_t> seen(points.size());
   in_parallel(points.size(), [&](std::size_t i) {
     const glm::dvec3 world = triple(points.positions, i);
-    seen[i] = std::any_of(cameras.begin(), cameras.end(),
-                          [&](const Camera& camera) { return sees(camera, world); });
+    seen[i] = std::any_of(cameras.begin(), cameras.end(), [&](const Camera& camera) {
+      return project_into(camera, world).has_value();
+    });
   });
   PointCloud out;
   for (std::size_t i = 0; i < points.size(); ++i) {
