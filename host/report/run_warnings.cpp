@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <glm/glm.hpp>
 #include <optional>
 #include <utility>
 
@@ -71,21 +72,32 @@ std::string names_of(const std::vector<Json>& views) {
                                : names;
 }
 
-double coordinate(const Json& photo, std::size_t axis) {
-  const auto center = photo.find("center");
-  const bool sound = center != photo.end() && center->is_array() && center->size() == 3 &&
-                     (*center)[axis].is_number();
-  return sound ? (*center)[axis].get<double>() : 0.0;
+/// Three numbers of a photo; nothing where they are missing.
+std::optional<glm::dvec3> vector_of(const Json& photo, const char* key) {
+  const auto found = photo.find(key);
+  if (found == photo.end() || !found->is_array() || found->size() != 3) return std::nullopt;
+  glm::dvec3 out;
+  for (int k = 0; k < 3; ++k) {
+    const Json& part = (*found)[static_cast<std::size_t>(k)];
+    if (!part.is_number()) return std::nullopt;
+    out[k] = part.get<double>();
+  }
+  return out;
 }
 
-/// The squared distance between the places that two photos were taken at.
+/// The squared distance between the places that two photos were taken at; those that nothing is
+/// known of lie at 0.
 double squared_distance(const Json& a, const Json& b) {
-  double sum = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const double along = coordinate(a, k) - coordinate(b, k);
-    sum += along * along;
-  }
-  return sum;
+  const glm::dvec3 along = vector_of(a, "center").value_or(glm::dvec3(0)) -
+                           vector_of(b, "center").value_or(glm::dvec3(0));
+  return glm::dot(along, along);
+}
+
+/// Whether two photos may show the same: they look less than 45 degrees apart, or all around.
+bool look_alike(const Json& a, const Json& b) {
+  const std::optional<glm::dvec3> one = vector_of(a, "direction"),
+                                  other = vector_of(b, "direction");
+  return !one || !other || glm::dot(*one, *other) > std::sqrt(0.5);
 }
 
 bool is_complete(const Json& metrics) {
@@ -149,25 +161,42 @@ std::string blurred(const std::vector<Json>& photos) {
   return names_of(far_below(photos, "sharpness", octaves, kBlurredOctaves));
 }
 
-/// Training photos that the model comes far less near to than to the others, and than to those from
-/// the two nearest places: what lies at the border of a capture is learned later, all of it. The
-/// distances count so many `times`.
+/// The PSNR of the photos from the nearest places that look the same way, at most so many.
+std::vector<double> psnr_beside(const std::vector<Json>& photos,
+                                const Json& photo,
+                                std::size_t most) {
+  std::vector<std::pair<double, double>> others;  // squared distance, PSNR
+  for (const Json& other : photos) {
+    if (other.contains("psnr") && text(other, "name") != text(photo, "name") &&
+        look_alike(photo, other))
+      others.emplace_back(squared_distance(photo, other), number(other, "psnr"));
+  }
+  std::sort(others.begin(), others.end());
+  others.resize(std::min(others.size(), most));
+  std::vector<double> out;
+  out.reserve(others.size());
+  for (const auto& [distance, psnr] : others) out.push_back(psnr);
+  return out;
+}
+
+/// Training photos that the model comes far less near to than to the others, and than to the two
+/// beside them: what lies at the border of a capture is learned later, all of it. The distances
+/// count so many `times`, and twice that for photos that no two look the same way as: each shows
+/// what none of the others does.
 std::string odd(const std::vector<Json>& photos, double times) {
   constexpr std::size_t kNeighbours = 2;
   constexpr std::size_t kLeast = 12;  // of fewer photos each shows much that no other does
+  constexpr double kAlone = 2.0;
   if (photos.size() < kLeast) return "";
   std::vector<Json> found = far_below(photos, "psnr", itself, kOddDecibels, times);
+  const std::vector<Json> farther = far_below(photos, "psnr", itself, kOddDecibels, kAlone * times);
   std::erase_if(found, [&](const Json& photo) {
-    std::vector<std::pair<double, double>> others;  // squared distance, PSNR
-    for (const Json& other : photos) {
-      if (other.contains("psnr") && text(other, "name") != text(photo, "name"))
-        others.emplace_back(squared_distance(photo, other), number(other, "psnr"));
-    }
-    std::sort(others.begin(), others.end());
-    others.resize(std::min(others.size(), kNeighbours));
-    return std::any_of(others.begin(), others.end(), [&](const auto& other) {
-      return number(photo, "psnr") > other.second - times * kOddDecibels;
-    });
+    const std::vector<double> beside = psnr_beside(photos, photo, kNeighbours);
+    const bool alone = beside.size() < kNeighbours;
+    if (alone && std::find(farther.begin(), farther.end(), photo) == farther.end()) return true;
+    const double least = (alone ? kAlone : 1.0) * times * kOddDecibels;
+    return std::any_of(beside.begin(), beside.end(),
+                       [&](double psnr) { return number(photo, "psnr") > psnr - least; });
   });
   return names_of(found);
 }

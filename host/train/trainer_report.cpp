@@ -10,6 +10,7 @@
 #include "eval/metrics.hpp"
 #include "raysplats/evaluation.hpp"
 #include "run/former_metrics.hpp"
+#include "scene/camera/view_axes.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
 #include "util/shell_word.hpp"
@@ -45,6 +46,11 @@ nlohmann::json Trainer::Impl::photo_report() const {
       photo["name"] = train_cameras[i].name;
       photo["sharpness"] = *sharpness;
       photo["center"] = {center.x, center.y, center.z};
+      // Panoramas look all around.
+      if (train_cameras[i].model != CameraModel::kEquirectangular) {
+        const glm::dvec3 direction = view_axis(train_cameras[i]);
+        photo["direction"] = {direction.x, direction.y, direction.z};
+      }
     }
     if (photo.is_null()) continue;
     if (std::isfinite(psnr[i])) photo["psnr"] = std::min(psnr[i], kMostPsnr);
@@ -91,10 +97,11 @@ std::string Trainer::Impl::capped_share(std::uint64_t capped) {
 // A handful is nothing that a user has to mend.
 void Trainer::Impl::tell_of_capped_rays(std::uint64_t capped) const {
   const bool many = static_cast<double>(capped) >= kManyCapped * static_cast<double>(traced_rays);
-  spdlog::log(many ? spdlog::level::warn : spdlog::level::info,
-              "iteration {}: {} of {} rays traced so far stopped at --max-hits {} and miss what lies "
-              "behind{}",
-              iteration, capped, traced_rays, options.trace.max_hits, many ? ": raise it" : "");
+  spdlog::log(
+      many ? spdlog::level::warn : spdlog::level::info,
+      "iteration {}: {} of {} rays traced so far stopped at --max-hits {} and miss what lies "
+      "behind{}",
+      iteration, capped, traced_rays, options.trace.max_hits, many ? ": raise it" : "");
 }
 
 // Warns when no picture came nearer to its photo.

@@ -101,6 +101,34 @@ TEST_CASE("a run that has seen its photos a few times warns of those alone that 
   CHECK(is_odd(20, 100));
 }
 
+TEST_CASE("a photo is compared with those beside it that look the same way") {
+  const Run run;
+  // Twelve photos along a line look along z; of two at its end one looks another way.
+  const auto names_last = [&](double psnr, const std::string& direction, double beside) {
+    std::string list;
+    for (int i = 0; i < 12; ++i) {
+      list +=
+          fmt::format(R"({{"name":"{0}.png","psnr":{1},"center":[{0},0,0],"direction":[0,0,1]}},)",
+                      i, i > 9 ? beside : 24 + i % 4);
+    }
+    list += fmt::format(R"({{"name":"last.png","psnr":{},"center":[12,0,0],"direction":{}}})", psnr,
+                        direction);
+    run.write("metrics.json",
+              fmt::format(R"({{"complete":true,"iteration":500,"photos":[{}]}})", list));
+    return contains(run_report(run.path()), "or something in them has moved: last.png.");
+  };
+  const std::string along = "[0,0,1]", oblique = "[0.6,0,0.8]", across = "[1,0,0]";
+  CHECK(names_last(17, along, 25));
+  CHECK(names_last(17, oblique, 25));
+  CHECK_FALSE(names_last(17, along, 19));
+  // What it alone shows is learned worse; a wrong pose costs more than that.
+  CHECK_FALSE(names_last(17, across, 25));
+  CHECK(names_last(11, across, 25));
+  // That those beside it are as bad is no excuse for one that looks elsewhere.
+  CHECK(names_last(11, across, 12));
+  CHECK_FALSE(names_last(11, along, 12));
+}
+
 TEST_CASE("a run whose held-out photos differ from the model by their colours names --exposure") {
   const Run run;
   const std::string advice =
