@@ -17,6 +17,7 @@ nlohmann::json to_json(const EvaluationMetrics& metrics) {
     json["name"] = metrics.name;
     json["center"] = metrics.center;
     json["sharpness"] = metrics.sharpness;
+    json["coarse_sharpness"] = metrics.coarse_sharpness;
   }
   json["psnr"] = metrics.psnr;
   json["ssim"] = metrics.ssim;

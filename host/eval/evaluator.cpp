@@ -90,7 +90,8 @@ void hide_masked_out(Comparison& pair) {
 struct MeasuredView {
   std::size_t index;  // among those that are evaluated
   bool compared, has_all, has_lpips, has_aligned;
-  double psnr, psnr_corrected, psnr_all, ssim, lpips, sharpness, psnr_aligned;
+  double psnr, psnr_corrected, psnr_all, ssim, lpips, psnr_aligned;
+  Sharpness sharpness;
 };
 
 double psnr_of(const Comparison& pair) {
@@ -123,7 +124,8 @@ EvaluationMetrics metrics_of(const MeasuredView& view) {
   if (view.has_all) out.psnr_all = view.psnr_all;
   if (view.has_aligned) out.psnr_aligned = view.psnr_aligned;
   if (view.has_lpips) out.lpips = view.lpips;
-  out.sharpness = view.sharpness;
+  out.sharpness = view.sharpness.fine;
+  out.coarse_sharpness = view.sharpness.coarse;
   return out;
 }
 

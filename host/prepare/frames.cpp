@@ -282,7 +282,7 @@ void take_frames(const fs::path& video,
     std::size_t best = first;
     double most = -1.0;
     for (std::size_t i = first; i < end; ++i) {
-      const double sharp = sharpness(read_image(all / names[i]));
+      const double sharp = sharpness(read_image(all / names[i])).fine;
       if (sharp > most) best = i;
       most = std::max(most, sharp);
     }

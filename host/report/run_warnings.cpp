@@ -157,8 +157,23 @@ bool stopped_growing(const Json& metrics,
          *std::max_element(count->second.begin(), count->second.end()) >= most;
 }
 
+/// Photos far less sharp than the others, but those in which there is as little to see at large, as
+/// of a plain wall: their pixels differ no less from what the reduced photo shows.
 std::string blurred(const std::vector<Json>& photos) {
-  return names_of(far_below(photos, "sharpness", octaves, kBlurredOctaves));
+  constexpr double kLostOctaves = 1.0;
+  const auto lost = [](const Json& photo) {
+    return octaves(number(photo, "coarse_sharpness")) - octaves(number(photo, "sharpness"));
+  };
+  std::vector<Json> found = far_below(photos, "sharpness", octaves, kBlurredOctaves);
+  std::vector<double> usual;
+  for (const Json& photo : photos) {
+    if (photo.contains("sharpness") && photo.contains("coarse_sharpness"))
+      usual.push_back(lost(photo));
+  }
+  if (usual.empty()) return names_of(found);  // of a run before both were measured
+  const double middle = median(std::move(usual));
+  std::erase_if(found, [&](const Json& photo) { return lost(photo) < middle + kLostOctaves; });
+  return names_of(found);
 }
 
 /// The PSNR of the photos from the nearest places that look the same way, at most so many.

@@ -41,10 +41,11 @@ nlohmann::json Trainer::Impl::photo_report() const {
   for (std::size_t i = 0; i < train_cameras.size(); ++i) {
     const auto known = before.find(train_cameras[i].name);
     nlohmann::json photo = known != before.end() ? std::move(known->second) : nullptr;
-    if (const std::optional<double> sharpness = photo_cache.sharpness_of(i)) {
+    if (const std::optional<Sharpness> sharpness = photo_cache.sharpness_of(i)) {
       const glm::dvec3 center = train_cameras[i].center();
       photo["name"] = train_cameras[i].name;
-      photo["sharpness"] = *sharpness;
+      photo["sharpness"] = sharpness->fine;
+      photo["coarse_sharpness"] = sharpness->coarse;
       photo["center"] = {center.x, center.y, center.z};
       // Panoramas look all around.
       if (train_cameras[i].model != CameraModel::kEquirectangular) {

@@ -38,6 +38,9 @@ struct EvaluationMetrics {
   /// How sharp the photo is, to compare with others of the scene: the mean square of the Laplacian
   /// of its brightness.
   double sharpness = 0;
+  /// The same of the photo reduced to some 24 pixels of its longer side: whether there is much to
+  /// be sharp about.
+  double coarse_sharpness = 0;
 };
 
 /// The measures of a comparison.
@@ -49,7 +52,7 @@ struct EvaluationReport {
   std::string table() const;
   /// {"psnr", "ssim", "psnr_corrected", "psnr_aligned" (if asked for), "psnr_all" (if some pixels
   /// are masked out), "lpips" (if measured), "images": [{"name", "psnr", "ssim", ..., "center",
-  /// "sharpness", "picture" (if written)}]}.
+  /// "sharpness", "coarse_sharpness", "picture" (if written)}]}.
   std::string json() const;
 };
 

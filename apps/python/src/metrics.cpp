@@ -67,11 +67,13 @@ void bind_report(nb::module_& module) {
               "Its file in the output folder; empty when none was written.")
       .def_ro("center", &EvaluationMetrics::center, "Of the camera.")
       .def_ro("sharpness", &EvaluationMetrics::sharpness,
-              "Of the photo, to compare with others of the scene.");
+              "Of the photo, to compare with others of the scene.")
+      .def_ro("coarse_sharpness", &EvaluationMetrics::coarse_sharpness,
+              "Of the photo reduced to some 24 pixels: whether there is much to be sharp about.");
   using Metrics = EvaluationMetrics;
   def_pickling(metrics, &Metrics::name, &Metrics::psnr, &Metrics::ssim, &Metrics::psnr_corrected,
                &Metrics::psnr_aligned, &Metrics::psnr_all, &Metrics::lpips, &Metrics::picture,
-               &Metrics::center, &Metrics::sharpness);
+               &Metrics::center, &Metrics::sharpness, &Metrics::coarse_sharpness);
   nb::class_<EvaluationReport> report(module, "EvaluationReport");
   report.def_ro("mean", &EvaluationReport::mean)
       .def_ro("images", &EvaluationReport::images)

@@ -5,7 +5,6 @@
 
 #include "io/photo/view_rows.hpp"
 #include "scene/image/pixel_count.hpp"
-#include "scene/image/sharpness.hpp"
 
 namespace raysplats::io {
 namespace {
@@ -76,7 +75,7 @@ float Photo::weight(int x, int y) const {
   return planes == 4 ? std::bit_cast<float>(word) : static_cast<float>(word) / kByte;
 }
 
-double sharpness(const Photo& photo) {
+Sharpness sharpness(const Photo& photo) {
   return raysplats::sharpness(photo.width, photo.height, [&](int y, double* row) {
     for (int x = 0; x < photo.width; ++x) {
       const std::array<float, 4> rgba = photo.at(x, y);

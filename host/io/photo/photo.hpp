@@ -8,6 +8,7 @@
 
 #include "raysplats/dataset.hpp"
 #include "scene/image/pixel_count.hpp"
+#include "scene/image/sharpness.hpp"
 
 namespace raysplats::io {
 
@@ -29,7 +30,7 @@ struct Photo {
 };
 
 /// sharpness() of the photo over black.
-double sharpness(const Photo& photo);
+Sharpness sharpness(const Photo& photo);
 
 /// What load_photo() will take.
 std::size_t photo_bytes(const View& view);

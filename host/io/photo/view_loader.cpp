@@ -115,7 +115,7 @@ void ViewLoader::forget(std::size_t index) {
   entry.state = State::kIdle;
 }
 
-std::optional<double> ViewLoader::sharpness_of(std::size_t index) const {
+std::optional<Sharpness> ViewLoader::sharpness_of(std::size_t index) const {
   const std::lock_guard lock(mutex_);
   return index < views_.size() ? entries_[index].sharpness : std::nullopt;
 }
@@ -157,7 +157,7 @@ void ViewLoader::work(const std::stop_token& stop) {
     const std::size_t index = queue_.front();
     queue_.pop_front();
     entries_[index].state = State::kLoading;
-    std::optional<double> sharpness = entries_[index].sharpness;
+    std::optional<Sharpness> sharpness = entries_[index].sharpness;
     lock.unlock();
     std::shared_ptr<const Photo> image;
     std::exception_ptr error;

@@ -48,7 +48,7 @@ class ViewLoader {
   void forget(std::size_t index);
 
   /// How sharp a picture is, found when it was first loaded; none for one that has not been.
-  std::optional<double> sharpness_of(std::size_t index) const;
+  std::optional<Sharpness> sharpness_of(std::size_t index) const;
 
   /// Bytes of the pictures kept now: within the budget but for those that get() is about to return.
   std::size_t cached_bytes() const;
@@ -62,7 +62,7 @@ class ViewLoader {
     std::uint64_t last_use = 0;
     std::shared_ptr<const Photo> image;
     std::exception_ptr error;
-    std::optional<double> sharpness;
+    std::optional<Sharpness> sharpness;
   };
 
   void work(const std::stop_token& stop);

@@ -40,7 +40,9 @@ class PhotoCache {
   void prefetch(std::span<const std::size_t> views);
 
   /// How sharp a photo is; none for one that nothing has asked for yet.
-  std::optional<double> sharpness_of(std::size_t view) const { return loader_.sharpness_of(view); }
+  std::optional<Sharpness> sharpness_of(std::size_t view) const {
+    return loader_.sharpness_of(view);
+  }
 
   /// Bytes of the photos that stay on the device.
   std::size_t cached_bytes() const { return cached_; }

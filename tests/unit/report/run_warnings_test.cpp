@@ -101,6 +101,24 @@ TEST_CASE("a run that has seen its photos a few times warns of those alone that 
   CHECK(is_odd(20, 100));
 }
 
+TEST_CASE("a photo of a plain wall is not called blurred") {
+  const Run run;
+  const auto is_blurred = [&](double sharpness, double coarse) {
+    std::string list;
+    for (int i = 0; i < 9; ++i)
+      list += fmt::format(R"({{"name":"{}.png","sharpness":{},"coarse_sharpness":0.2}},)", i,
+                          0.05 + 0.01 * (i % 3));
+    run.write("metrics.json", fmt::format(R"({{"complete":true,"photos":[{}
+                {{"name":"last.png","sharpness":{},"coarse_sharpness":{}}}]}})",
+                                          list, sharpness, coarse));
+    return contains(run_report(run.path()), "which blur the model: last.png.");
+  };
+  CHECK(is_blurred(0.005, 0.2));
+  CHECK(is_blurred(0.005, 0.05));
+  CHECK_FALSE(is_blurred(0.005, 0.02));
+  CHECK_FALSE(is_blurred(0.05, 0.5));
+}
+
 TEST_CASE("a photo is compared with those beside it that look the same way") {
   const Run run;
   // Twelve photos along a line look along z; of two at its end one looks another way.

@@ -105,7 +105,9 @@ TEST_CASE("photos of 8 bits are kept as in their files, grey or colour, with alp
       for (int c = 0; c < 3; ++c) sum += channel(numbers, channels, i, c, 255);
       over_black.data[i] = static_cast<float>(sum / 3 * channel(numbers, channels, i, 3, 255));
     }
-    CHECK(io::sharpness(photo) == doctest::Approx(sharpness(over_black)).epsilon(1e-5));
+    CHECK(io::sharpness(photo).fine == doctest::Approx(sharpness(over_black).fine).epsilon(1e-5));
+    CHECK(io::sharpness(photo).coarse ==
+          doctest::Approx(sharpness(over_black).coarse).epsilon(1e-5));
     // The word of the device: r, g, b, a from the low byte.
     for (int c = 0; c < 4; ++c) {
       CHECK((photo.words[5] >> (8 * c) & 255u) ==

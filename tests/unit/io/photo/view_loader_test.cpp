@@ -68,8 +68,8 @@ TEST_CASE("a loaded picture says how sharp it is, also once it is forgotten") {
     loader.get(i);
     loader.forget(i);
   }
-  CHECK(*loader.sharpness_of(0) == 0.0);
-  CHECK(*loader.sharpness_of(1) == doctest::Approx((16.0 + 4.0) / (kSide * kSide)));
+  CHECK(loader.sharpness_of(0)->fine == 0.0);
+  CHECK(loader.sharpness_of(1)->fine == doctest::Approx((16.0 + 4.0) / (kSide * kSide)));
   CHECK(!loader.sharpness_of(2));
 }
 
