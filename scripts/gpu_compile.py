@@ -8,7 +8,7 @@ vector ones; adds: native additions to floats in global memory; swaps: compare-a
 scripts/gpu/baseline.json. Ends with 1 when a kernel does not compile or has unresolved symbols, spills where the baseline
 does not, or takes more than the baseline allows: registers 10 % and 8, private and local memory 10 % and 64 bytes, spills
 and moved registers 25 %, moved ones 8 on top, swaps and barriers 25 %; or where a width is narrower or native additions
-are gone. What the baseline does not know is allowed no spills; and the tables in docs/gpu_compilers.md and those of
+are gone. What the baseline does not know is allowed no spills, and so is what --installed compiles; and the tables in docs/gpu_compilers.md and those of
 the library's model of speed have to be the baseline's: --write-baseline writes them too. Ends with 3 when a compiler cannot be had."""
 import argparse
 import json
@@ -27,7 +27,7 @@ import programs  # noqa: E402
 import table  # noqa: E402
 
 BASELINE = os.path.join(HERE, "gpu", "baseline.json")
-TARGETS = ["gfx906", "gfx90a", "gfx1030", "gfx1100", "sm_70", "sm_86", "sm_90", "dg2-g10", "tgllp"]
+TARGETS = ["gfx906", "gfx90a", "gfx942", "gfx1030", "gfx1100", "gfx1201", "sm_70", "sm_86", "sm_90", "sm_120", "dg2-g10", "tgllp"]
 FIGURES = ["registers", "spills", "moved", "private", "local", "width", "adds", "swaps", "barriers"]
 
 
@@ -37,6 +37,8 @@ def arguments():
     parser.add_argument("--targets", default=",".join(TARGETS), help="comma-separated (default: %(default)s)")
     parser.add_argument("--only", default="", metavar="TEXT", help="programs whose name contains TEXT")
     parser.add_argument("--list", action="store_true", help="list targets and programs, compile nothing")
+    parser.add_argument("--installed", action="store_true",
+                        help="Intel's compiler of this system (Debian: intel-ocloc and libigdfcl2) for its --targets, of which `ocloc compile --help` has more")
     parser.add_argument("--write-baseline", action="store_true", help="store the figures instead of comparing them")
     parser.add_argument("--skip-missing", action="store_true", help="leave out compilers that cannot be had")
     parser.add_argument("--quiet", action="store_true", help="no table")
@@ -120,8 +122,14 @@ def main():
             print(f"{name}: {path} {' '.join(f'-D{key}={value}' for key, value in sorted(definitions.items()))}")
         return 0
     for target in targets:
-        if target not in TARGETS:
+        if options.installed and compilers.vendor(target) != "intel":
+            sys.exit(f"--targets {target}: --installed is for Intel's alone")
+        if target not in TARGETS and not options.installed:
             sys.exit(f"--targets {target}: choose from {', '.join(TARGETS)}")
+    if options.installed and options.write_baseline:
+        sys.exit("--write-baseline is for the pinned compilers, not for --installed")
+    if options.installed and not os.path.exists("/usr/bin/ocloc"):
+        sys.exit("--installed: there is no /usr/bin/ocloc (Debian: intel-ocloc)")
     if not chosen:
         sys.exit(f"--only {options.only}: no program has that in its name (--list)")
     failures = [f"{path} is in no program of scripts/gpu/programs.py" for path in programs.unlisted()]
@@ -131,7 +139,7 @@ def main():
     cache = os.path.abspath(options.cache)
     for vendor in dict.fromkeys(compilers.vendor(target) for target in targets):
         try:
-            roots[vendor] = packages.fetch(vendor, cache)
+            roots[vendor] = "" if options.installed else packages.fetch(vendor, cache)
         except packages.Missing as error:
             missing[vendor] = str(error)
             print(f"{'SKIPPED' if options.skip_missing else 'MISSING'} {vendor}: {error}")
@@ -151,7 +159,7 @@ def main():
     if not options.quiet:
         print_table(results, targets)
     stored = {}
-    if os.path.exists(BASELINE):
+    if os.path.exists(BASELINE) and not options.installed:
         with open(BASELINE, encoding="utf-8") as file:
             stored = json.load(file)
     if options.write_baseline and not failures:
@@ -168,7 +176,8 @@ def main():
         print(f"Wrote {BASELINE}, the tables in docs/gpu_compilers.md and host/bench/compiled_kernels.cpp")
     elif not options.write_baseline:
         failures += compare(results, stored, targets, chosen)
-        failures += [f"{path} does not hold the baseline's figures: --write-baseline writes both" for path in table.stale(stored, TARGETS)]
+        if not options.installed:
+            failures += [f"{path} does not hold the baseline's figures: --write-baseline writes both" for path in table.stale(stored, TARGETS)]
     for failure in failures:
         print("FAILED " + failure)
     if targets:

@@ -87,10 +87,14 @@ def _elf_sections(path):
     return {text(sections[strings][4] + name): data[begin:begin + length] for name, _, _, _, begin, length in sections}
 
 
+# What clang 19 does not know yet; ptxas takes the code of an older one, as the driver does.
+NVIDIA_AS = {"sm_120": "sm_90"}
+
+
 def nvidia(root, target, flags, source, stem):
     # libclc calls NVIDIA's own library of device functions.
     built_in = [f"{root}/usr/lib/clc/nvptx64--nvidiacl.bc", f"{root}/nvidia/cuda_nvcc/nvvm/libdevice/libdevice.10.bc"]
-    clang = [word for library in built_in for word in ("-mlink-builtin-bitcode", library)] + ["-target-cpu", target, "-target-feature", "+ptx78"]
+    clang = [word for library in built_in for word in ("-mlink-builtin-bitcode", library)] + ["-target-cpu", NVIDIA_AS.get(target, target), "-target-feature", "+ptx78"]
     # What its front end defines, and its default precision of division and square root in OpenCL C.
     driver = ["-D__NV_CL_C_VERSION=120", "-mllvm", "-nvptx-prec-divf32=1", "-mllvm", "-nvptx-prec-sqrtf32=0"]
     _clang("nvidia", root, [*flags, "--target=nvptx64--nvidiacl", *(word for option in clang for word in ("-Xclang", option)), *driver,

@@ -14,7 +14,7 @@ def _count(text, patterns):
 
 def amd(assembly):
     """Of clang's assembly."""
-    patterns = (r"\b(?:global|flat)_atomic_(?:pk_)?add_f\d+", r"\b(?:global|flat)_atomic_cmpswap", r"\bs_barrier\b")
+    patterns = (r"\b(?:global|flat)_atomic_(?:pk_)?add_f\d+", r"\b(?:global|flat)_atomic_cmpswap", r"\bs_barrier(?:_wait)?\b")
     return {name: _count(body, patterns) for name, body in re.findall(r"^(\w+):[^\n]*\n(.*?)^\.Lfunc_end", assembly, re.M | re.S)}
 
 

@@ -42,10 +42,12 @@ ROWS = [
 ]
 
 # Of a SIMD of AMD's: registers of a work-item and how many are given out together, most waves, local bytes.
-AMD = {"gfx906": (256, 4, 10, 16384), "gfx90a": (512, 8, 8, 16384), "gfx1030": (1024, 16, 16, 32768), "gfx1100": (1536, 24, 16, 32768)}
+AMD = {"gfx906": (256, 4, 10, 16384), "gfx90a": (512, 8, 8, 16384), "gfx942": (512, 8, 8, 16384), "gfx1030": (1024, 16, 16, 32768), "gfx1100": (1536, 24, 16, 32768),
+       "gfx1201": (1536, 24, 16, 32768)}
 # Of a multiprocessor of NVIDIA's: most warps, most groups, local bytes, and of them those that each group takes beside its own.
-NVIDIA = {"sm_70": (64, 32, 98304, 0), "sm_86": (48, 16, 102400, 1024), "sm_90": (64, 32, 233472, 1024)}
-BUDGETS = {"gfx906": 4, "gfx90a": 4, "gfx1030": 8, "gfx1100": 8, "sm_70": 16, "sm_86": 16, "sm_90": 16}
+NVIDIA = {"sm_70": (64, 32, 98304, 0), "sm_86": (48, 16, 102400, 1024), "sm_90": (64, 32, 233472, 1024),
+          "sm_120": (48, 24, 102400, 1024)}
+BUDGETS = {"gfx906": 4, "gfx90a": 4, "gfx942": 4, "gfx1030": 8, "gfx1100": 8, "gfx1201": 8, "sm_70": 16, "sm_86": 16, "sm_90": 16, "sm_120": 16}
 
 # The model of speed: targets of its cards; kernels of its rows (speed_model.cpp) and work-items of a group.
 MODEL_TARGETS = ["gfx1100", "dg2-g10", "sm_86", "sm_90"]
