@@ -17,11 +17,13 @@ nlohmann::json to_json(const EvaluationMetrics& metrics) {
     json["name"] = metrics.name;
     json["center"] = metrics.center;
     json["sharpness"] = metrics.sharpness;
+    json["shift"] = metrics.shift;
     json["coarse_sharpness"] = metrics.coarse_sharpness;
   }
   json["psnr"] = metrics.psnr;
   json["ssim"] = metrics.ssim;
   json["psnr_corrected"] = metrics.psnr_corrected;
+  json["psnr_shifted"] = metrics.psnr_shifted;
   if (metrics.psnr_aligned) json["psnr_aligned"] = *metrics.psnr_aligned;
   if (metrics.psnr_all) json["psnr_all"] = *metrics.psnr_all;
   if (metrics.lpips) json["lpips"] = *metrics.lpips;

@@ -13,6 +13,7 @@
 #include "comm/communicator.hpp"
 #include "eval/error_map.hpp"
 #include "eval/metrics.hpp"
+#include "eval/shift_fit.hpp"
 #include "eval/view_alignment.hpp"
 #include "io/dataset/dataset_views.hpp"
 #include "raysplats/error.hpp"
@@ -91,6 +92,7 @@ struct MeasuredView {
   std::size_t index;  // among those that are evaluated
   bool compared, has_all, has_lpips, has_aligned;
   double psnr, psnr_corrected, psnr_all, ssim, lpips, psnr_aligned;
+  ShiftFit shifted;
   Sharpness sharpness;
 };
 
@@ -106,6 +108,7 @@ MeasuredView measure(std::size_t index, Comparison& pair, Lpips* lpips) {
   if (!out.compared) return out;
   out.psnr = psnr_of(pair);
   out.psnr_corrected = std::min(corrected_psnr(pair.render, pair.photo, pair.mask), kMostPsnr);
+  out.shifted = fit_shift(pair.render, pair.photo, pair.mask);
   out.has_all = pair.valid < 1.0;
   if (out.has_all) out.psnr_all = std::min(psnr(pair.render, pair.photo), kMostPsnr);
   hide_masked_out(pair);
@@ -121,6 +124,8 @@ EvaluationMetrics metrics_of(const MeasuredView& view) {
   out.psnr = view.psnr;
   out.ssim = view.ssim;
   out.psnr_corrected = view.psnr_corrected;
+  out.psnr_shifted = std::min(view.psnr + view.shifted.gain, kMostPsnr);
+  out.shift = {view.shifted.shift.x, view.shifted.shift.y};
   if (view.has_all) out.psnr_all = view.psnr_all;
   if (view.has_aligned) out.psnr_aligned = view.psnr_aligned;
   if (view.has_lpips) out.lpips = view.lpips;
@@ -174,6 +179,7 @@ EvaluationMetrics mean_of(const std::vector<EvaluationMetrics>& images) {
     mean.psnr += image.psnr * share;
     mean.ssim += image.ssim * share;
     mean.psnr_corrected += image.psnr_corrected * share;
+    mean.psnr_shifted += image.psnr_shifted * share;
     if (masked) *mean.psnr_all += image.psnr_all.value_or(image.psnr) * share;
     if (image.psnr_aligned)
       mean.psnr_aligned = mean.psnr_aligned.value_or(0.0) + *image.psnr_aligned * share;

@@ -24,6 +24,7 @@ constexpr double kNothingLearned = 0.1;
 constexpr double kFullShare = 0.99;  ///< of the most Gaussians; passes leave out the last few
 constexpr double kOddDecibels = 3.0;
 constexpr double kColorsDecibels = 1.5;
+constexpr double kShiftDecibels = 0.5;  ///< of sound captures none gained more than 0.1
 constexpr double kBlurredOctaves = 2.0;
 constexpr std::size_t kFewViews = 5;  ///< of which none can be called odd
 constexpr std::size_t kNamed = 4;
@@ -142,6 +143,34 @@ double gained_by_colors(const Json& metrics, const Settings& settings) {
   const double plain = number(last, "psnr"), fitted = number(last, "psnr_corrected");
   const double square = std::pow(10.0, -plain / 10.0) - std::pow(10.0, -fitted / 10.0);
   return fitted >= kNear && square > kSeen * kSeen ? fitted - plain : 0;
+}
+
+/// How much nearer held-out photos are to the model once each is shifted in its plane, in dB, and
+/// by how many pixels in the median; nothing of an older run, or one that has just begun.
+std::optional<std::pair<double, double>> gained_by_shift(const std::vector<Json>& views,
+                                                         const Json& metrics,
+                                                         const Settings& settings) {
+  constexpr double kSteps = 100, kVisits = 3;
+  const std::vector<Json> evaluations = objects(metrics, "evaluations");
+  const auto poses = settings.find("poses");
+  if (evaluations.empty() || (poses != settings.end() && poses->second == "true"))
+    return std::nullopt;
+  const double iteration = number(evaluations.back(), "iteration");
+  if (iteration < kSteps || !has_visited(metrics, settings, iteration, kVisits))
+    return std::nullopt;
+  double gain = 0;
+  std::vector<double> pixels;
+  for (const Json& view : views) {
+    const auto shift = view.find("shift");
+    if (shift == view.end() || !shift->is_array() || shift->size() != 2 ||
+        !(*shift)[0].is_number() || !(*shift)[1].is_number())
+      continue;
+    gain += number(view, "psnr_shifted") - number(view, "psnr");
+    pixels.push_back(std::hypot((*shift)[0].get<double>(), (*shift)[1].get<double>()));
+  }
+  if (pixels.empty()) return std::nullopt;
+  gain /= static_cast<double>(pixels.size());
+  return std::pair(gain, median(std::move(pixels)));
 }
 
 /// Whether the limit has cut off growth. The other strategies go there by plan.
@@ -309,6 +338,13 @@ std::vector<std::string> warnings_of(const Json& metrics,
         "Held-out photos are {:.1f} dB nearer to the model once their colours are fitted, as where "
         "exposure or white balance changes between photos: try --exposure",
         gain));
+  }
+  if (const auto gain = gained_by_shift(views, metrics, settings);
+      gain && gain->first > kShiftDecibels) {
+    out.push_back(fmt::format(
+        "Held-out photos are {:.1f} dB nearer to the model once each is shifted, by {:.1f} pixels "
+        "in the median, as where poses are inexact: try --poses",
+        gain->first, gain->second));
   }
   warn_of_views(views, metrics, settings, out);
   return out;

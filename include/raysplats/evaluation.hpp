@@ -26,6 +26,9 @@ struct EvaluationMetrics {
   /// psnr after the affine colour (3 x 4) that brings the render closest to the photo: what is
   /// left when exposure and white balance do not count.
   double psnr_corrected = 0;
+  /// psnr where the render is shifted in its plane to where it comes closest to the photo: much
+  /// more where poses are inexact, next to nothing elsewhere.
+  double psnr_shifted = 0;
   /// With EvaluationOptions::align, as psnr where the camera was turned and shifted to where its
   /// picture comes closest to the photo: what is left when errors of poses do not count. With
   /// EvaluationOptions::align_colors as psnr_corrected there.
@@ -35,6 +38,7 @@ struct EvaluationMetrics {
   std::optional<double> lpips;
   std::string picture;             ///< its file in the output folder; empty when none was written
   std::array<double, 3> center{};  ///< of the camera, from Dataset::origin
+  std::array<double, 2> shift{};   ///< that of psnr_shifted: pixels to the right and down
   /// How sharp the photo is, to compare with others of the scene: the mean square of the Laplacian
   /// of its brightness.
   double sharpness = 0;
@@ -50,9 +54,9 @@ struct EvaluationReport {
 
   /// One line per image and the mean, aligned.
   std::string table() const;
-  /// {"psnr", "ssim", "psnr_corrected", "psnr_aligned" (if asked for), "psnr_all" (if some pixels
-  /// are masked out), "lpips" (if measured), "images": [{"name", "psnr", "ssim", ..., "center",
-  /// "sharpness", "coarse_sharpness", "picture" (if written)}]}.
+  /// {"psnr", "ssim", "psnr_corrected", "psnr_shifted", "psnr_aligned" (if asked for), "psnr_all"
+  /// (if some pixels are masked out), "lpips" (if measured), "images": [{"name", "psnr", "ssim",
+  /// ..., "center", "shift", "sharpness", "coarse_sharpness", "picture" (if written)}]}.
   std::string json() const;
 };
 

@@ -59,6 +59,8 @@ void bind_report(nb::module_& module) {
       .def_ro("ssim", &EvaluationMetrics::ssim)
       .def_ro("psnr_corrected", &EvaluationMetrics::psnr_corrected,
               "PSNR when exposure and white balance do not count.")
+      .def_ro("psnr_shifted", &EvaluationMetrics::psnr_shifted,
+              "PSNR once the render is shifted in its plane to where it fits the photo best.")
       .def_ro("psnr_all", &EvaluationMetrics::psnr_all,
               "Over all pixels, when some are masked out.")
       .def_ro("psnr_aligned", &EvaluationMetrics::psnr_aligned,
@@ -66,6 +68,7 @@ void bind_report(nb::module_& module) {
       .def_ro("picture", &EvaluationMetrics::picture,
               "Its file in the output folder; empty when none was written.")
       .def_ro("center", &EvaluationMetrics::center, "Of the camera.")
+      .def_ro("shift", &EvaluationMetrics::shift, "That of psnr_shifted: pixels right and down.")
       .def_ro("sharpness", &EvaluationMetrics::sharpness,
               "Of the photo, to compare with others of the scene.")
       .def_ro("coarse_sharpness", &EvaluationMetrics::coarse_sharpness,
@@ -73,7 +76,8 @@ void bind_report(nb::module_& module) {
   using Metrics = EvaluationMetrics;
   def_pickling(metrics, &Metrics::name, &Metrics::psnr, &Metrics::ssim, &Metrics::psnr_corrected,
                &Metrics::psnr_aligned, &Metrics::psnr_all, &Metrics::lpips, &Metrics::picture,
-               &Metrics::center, &Metrics::sharpness, &Metrics::coarse_sharpness);
+               &Metrics::center, &Metrics::sharpness, &Metrics::coarse_sharpness,
+               &Metrics::psnr_shifted, &Metrics::shift);
   nb::class_<EvaluationReport> report(module, "EvaluationReport");
   report.def_ro("mean", &EvaluationReport::mean)
       .def_ro("images", &EvaluationReport::images)

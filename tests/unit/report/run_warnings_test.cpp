@@ -101,6 +101,30 @@ TEST_CASE("a run that has seen its photos a few times warns of those alone that 
   CHECK(is_odd(20, 100));
 }
 
+TEST_CASE("a run whose held-out photos fit where they are shifted names --poses") {
+  const Run run;
+  const auto names_poses = [&](double gain, int iteration, const std::string& poses) {
+    std::string images;
+    for (const double pixels : {0.5, 1.2, 2.0}) {
+      images += fmt::format(R"({}{{"psnr":24,"psnr_shifted":{},"shift":[{},0]}})",
+                            images.empty() ? "" : ",", 24 + gain, pixels);
+    }
+    run.write(fmt::format("eval/iteration_{}/metrics.json", iteration),
+              fmt::format(R"({{"images":[{}]}})", images));
+    run.write("metrics.json", fmt::format(R"({{"complete":true,"photos":[],"evaluations":[
+                {{"iteration":{},"psnr":24,"views":3}}]}})",
+                                          iteration));
+    run.write("config.toml", "poses = " + poses + "\n");
+    return contains(run_report(run.path()),
+                    "nearer to the model once each is shifted, by 1.2 pixels in the median, as "
+                    "where poses are inexact: try --poses.");
+  };
+  CHECK(names_poses(0.6, 300, "false"));
+  CHECK_FALSE(names_poses(0.4, 301, "false"));
+  CHECK_FALSE(names_poses(3, 302, "true"));
+  CHECK_FALSE(names_poses(3, 50, "false"));
+}
+
 TEST_CASE("a photo of a plain wall is not called blurred") {
   const Run run;
   const auto is_blurred = [&](double sharpness, double coarse) {
