@@ -31,6 +31,7 @@ constexpr double kShortRun = 20;    // seconds of a run that is not worth more m
 constexpr double kFillShare = 0.5;  // of the limit that a start takes at most
 constexpr std::int64_t kFewIterations = 500;
 constexpr double kLatestEnd = 2;         // of the iterations that were planned
+constexpr double kGrace = 0.07;          // of the time that a slow run takes on for its last steps
 constexpr double kTellingChange = 0.03;  // of them, that users are told of
 
 void require_end(double seconds) {
@@ -336,7 +337,8 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
 }
 
 // Keeps a run by time to its time: its last steps are alike, and once a part of them is timed the
-// time that is left tells how many more there can be. What the steps do depends on the schedules
+// time that is left tells how many more there can be; some in any case, in which rates come to
+// their end and the model's mean is taken. What the steps do depends on the schedules
 // alone, so that a run which is given this end from the beginning has the same bytes. Returns
 // whether the run now has another end.
 bool Trainer::Impl::fit_end_to_time() {
@@ -351,8 +353,10 @@ bool Trainer::Impl::fit_end_to_time() {
   if (!clock.steady_seconds || iteration != until || iteration >= options.iterations) return false;
   finish_steps();
   const double now = clock.training.seconds();
-  const double more = (*clock.run_seconds - now) / (now - *clock.steady_seconds) *
-                      static_cast<double>(until - from);
+  const double step = (now - *clock.steady_seconds) / static_cast<double>(until - from);
+  const double planned = step * static_cast<double>(options.iterations - until);
+  const double least = std::min(planned, kGrace * *clock.run_seconds);
+  const double more = std::max(*clock.run_seconds - now, least) / step;
   const auto latest = kLatestEnd * static_cast<double>(options.iterations);
   const double end =
       std::clamp(static_cast<double>(iteration) + more, static_cast<double>(iteration) + 1, latest);

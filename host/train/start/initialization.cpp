@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -77,7 +78,17 @@ PointCloud photo_points(const Dataset& dataset,
       "cameras){}",
       found.nearest, found.farthest, found.typical, guess,
       found.open ? "; they leave depths open" : "");
-  SweptPoints swept = swept_points(photos, found, count, unsure, seed);
+  PointCloud foreground;
+  if (found.open) {
+    if (const std::optional<DepthRange> near = foreground_depths(photos, guess, seed))
+      foreground = swept_points(photos, *near, count / 2, 0.0, seed).points;
+  }
+  SweptPoints swept = swept_points(photos, found, count - foreground.size(), unsure, seed);
+  if (foreground.size() > 0) {
+    spdlog::debug("{} points of the start stand before what is too far to tell its depth",
+                  foreground.size());
+    for (std::size_t i = 0; i < foreground.size(); ++i) append_point(foreground, i, swept.points);
+  }
   if (checks_poses) check_poses(dataset, photos, swept.agreed, seed);
   return std::move(swept.points);
 }
@@ -88,6 +99,11 @@ Gaussians given_model(const Dataset& dataset,
                       std::size_t limit,
                       const TrainOptions& options) {
   constexpr double kLeastSeen = 0.01;  // what photos of a model's scene see more of
+  if (!std::filesystem::exists(options.init)) {
+    throw DataError(fmt::format(
+        "The start '{}' is neither a file that exists nor one of auto, colmap, photos and random",
+        options.init));
+  }
   Gaussians model = with_sh_degree(read_model(options.init), options.sh_degree);
   const std::array<double, 3> origin = io::model_origin(options.init);
   for (std::size_t i = 0; i < model.means.size(); ++i) {

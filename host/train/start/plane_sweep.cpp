@@ -42,14 +42,15 @@ constexpr std::size_t kProbes = 2000;      // pixels that are looked at
 constexpr std::size_t kFewProbes = 40;     // that tell less are no reason to doubt the guess
 constexpr std::size_t kProbeDepths = 112;  // steps to 1000 times the guess
 constexpr double kProbeReach = 1000.0;
-constexpr double kProbeTurn = 0.15;   // 1 - cosine between photos that are compared: 32 degrees
-constexpr double kAsGood = 1.3;       // costs up to that multiple of the best agree as well
-constexpr double kFloorCost = 1e-4;   // of photos' noise
-constexpr double kWrongGuess = 3.0;   // factor
-constexpr double kOpenShare = 0.5;    // of probes that see no end of the depths: most are open
-constexpr double kClearlyMore = 1.2;  // times as many pixels agree about another depth
-constexpr int kRounds = 4;            // of looking for other depths
-constexpr double kMuchNearer = 0.65;  // than the typical one, as a share of it
+constexpr double kProbeTurn = 0.15;  // 1 - cosine between photos that are compared: 32 degrees
+constexpr double kAsGood = 1.3;      // costs up to that multiple of the best agree as well
+constexpr double kFloorCost = 1e-4;  // of photos' noise
+constexpr double kWrongGuess = 3.0;  // factor
+constexpr double kOpenShare = 0.5;   // of probes that see no end of the depths: most are open
+constexpr double kForegroundShare = 0.05;  // of probes that agree about something before the open
+constexpr double kClearlyMore = 1.2;       // times as many pixels agree about another depth
+constexpr int kRounds = 4;                 // of looking for other depths
+constexpr double kMuchNearer = 0.65;       // than the typical one, as a share of it
 constexpr double kMuchFarther = 2.0;
 constexpr double kEnd = 1.25;  // times the nearest or farthest depth: an end of a range
 
@@ -354,6 +355,14 @@ DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::u
   const DepthRange farther = depths_around(typical);
   const bool better = clearly_more(agreement(photos, farther, seed), near.agreement);
   return better ? settled(photos, farther, seed).depths : near.depths;
+}
+
+std::optional<DepthRange> foreground_depths(std::span<const SmallPhoto> photos,
+                                            double guess,
+                                            std::uint64_t seed) {
+  const Settled near = settled(photos, depths_around(guess), seed);
+  const double share = static_cast<double>(near.agreement.inside) / static_cast<double>(kProbes);
+  return share > kForegroundShare ? std::optional(near.depths) : std::nullopt;
 }
 
 SweptPoints probe_sweep(std::span<const SmallPhoto> photos,

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "raysplats/dataset.hpp"
@@ -20,6 +21,12 @@ DepthRange depths_around(double typical);
 /// cameras have no common target, it lies around their depth; likewise where clearly more of them
 /// agree about a farther one, as from cameras turned at arm's length. `guess` is positive.
 DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed);
+
+/// The range about the depth of what stands before an open one, as a terrace before far mountains:
+/// nothing where next to no pixels agree about any.
+std::optional<DepthRange> foreground_depths(std::span<const SmallPhoto> photos,
+                                            double guess,
+                                            std::uint64_t seed);
 
 /// What a sweep finds.
 struct SweptPoints {

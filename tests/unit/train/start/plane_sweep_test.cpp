@@ -10,6 +10,7 @@
 #include <glm/trigonometric.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <optional>
 #include <vector>
 
 #include "raysplats/error.hpp"
@@ -201,6 +202,7 @@ TEST_CASE("cameras on a tripod look at what is far away") {
     const double guess = radius > 0 ? radius : 1.0;
     const DepthRange depths = swept_depths(photos, guess, 3);
     CHECK(depths.open);
+    CHECK_FALSE(foreground_depths(photos, guess, 3));
     const PointCloud points = swept_points(photos, depths, 400, 0.25, 3).points;
     CHECK(points.size() > 390);
     std::size_t far = 0;
@@ -228,6 +230,43 @@ TEST_CASE("cameras on a tripod look at what is far away") {
   const DepthRange before_white = swept_depths(studio, 3.0, 3);
   CHECK(!before_white.open);
   CHECK(before_white.typical == 3.0);
+}
+
+TEST_CASE("what stands before far mountains is found though most pixels tell no depth") {
+  // A terrace's wall in the lower part of the photos, and what is too far to move between them.
+  const auto outlook = [](const CameraRay& ray) {
+    const glm::dvec3 p = ray.origin + 4.0 / ray.direction.x * ray.direction;
+    if (p.z < -0.4) {
+      return glm::dvec4(0.5 + 0.4 * std::sin(11 * p.y + 5 * p.z),
+                        0.5 + 0.4 * std::cos(9 * p.z - 7 * p.y),
+                        0.5 + 0.4 * std::sin(8 * p.y - 6 * p.z), 1.0);
+    }
+    const glm::dvec3 far = 40.0 * ray.direction;
+    return glm::dvec4(0.5 + 0.4 * std::sin(far.y + far.z), 0.5 + 0.4 * std::cos(2 * far.z - far.y),
+                      0.5 + 0.4 * std::sin(2 * far.y), 1.0);
+  };
+  std::vector<SmallPhoto> photos;
+  for (int i = 0; i < 25; ++i) {
+    const int row = i / 5;
+    const glm::dvec3 eye(0, 0.5 * (i % 5 - 2), 0.2 * (row - 2));
+    photos.push_back(
+        photo_of(look_at(eye, eye + glm::dvec3(1, 0, 0), {0, 0, 1}, 96, 72, 80), outlook));
+  }
+  const DepthRange depths = swept_depths(photos, 3.0, 3);
+  CHECK(depths.open);
+  CHECK(depths.nearest > 5.0);
+  const std::optional<DepthRange> near = foreground_depths(photos, 3.0, 3);
+  REQUIRE(near);
+  CHECK(!near->open);
+  const PointCloud points = swept_points(photos, *near, 200, 0.0, 5).points;
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* q = points.positions.data() + 3 * i;
+    found += std::abs(q[0] - 4.0f) < 0.5f && q[2] < -0.2f ? 1 : 0;
+  }
+  MESSAGE(found << " of " << points.size() << " points on the wall, typically " << near->typical);
+  CHECK(points.size() > 100);
+  CHECK(found > points.size() * 6 / 10);
 }
 
 TEST_CASE("cameras turned at arm's length find what is around them") {
