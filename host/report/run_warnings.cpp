@@ -128,9 +128,22 @@ bool has_visited(const Json& metrics, const Settings& settings, double iteration
   return iteration * views.value_or(1.0) >= std::min(times * photos, kManyViews);
 }
 
+/// The median of what views gain once their colours are fitted, in dB: haze before a few cameras is
+/// no exposure. Nothing where no view tells.
+std::optional<double> usual_gain_by_colors(const std::vector<Json>& views) {
+  std::vector<double> gains;
+  for (const Json& view : views) {
+    if (view.contains("psnr") && view.contains("psnr_corrected"))
+      gains.push_back(number(view, "psnr_corrected") - number(view, "psnr"));
+  }
+  return gains.empty() ? std::nullopt : std::optional(median(std::move(gains)));
+}
+
 /// How much nearer held-out photos are to the model once their colours are fitted, in dB, where
 /// that tells of exposure; 0 elsewhere.
-double gained_by_colors(const Json& metrics, const Settings& settings) {
+double gained_by_colors(const std::vector<Json>& views,
+                        const Json& metrics,
+                        const Settings& settings) {
   constexpr double kSteps = 100, kVisits = 3;  // before that colours are still on their way
   constexpr double kNear = 22;     // dB; fitted colours bring any photo near to a model that fails
   constexpr double kSeen = 0.025;  // root of the mean square; less is nothing of a dark scene
@@ -142,7 +155,8 @@ double gained_by_colors(const Json& metrics, const Settings& settings) {
   if (iteration < kSteps || !has_visited(metrics, settings, iteration, kVisits)) return 0;
   const double plain = number(last, "psnr"), fitted = number(last, "psnr_corrected");
   const double square = std::pow(10.0, -plain / 10.0) - std::pow(10.0, -fitted / 10.0);
-  return fitted >= kNear && square > kSeen * kSeen ? fitted - plain : 0;
+  if (fitted < kNear || square <= kSeen * kSeen) return 0;
+  return std::min(fitted - plain, usual_gain_by_colors(views).value_or(fitted - plain));
 }
 
 /// How much nearer held-out photos are to the model once each is shifted in its plane, in dB, and
@@ -333,7 +347,7 @@ std::vector<std::string> warnings_of(const Json& metrics,
         fmt::format("The number of Gaussians stopped at its limit of {:.0f}: raise --max-gaussians",
                     number(metrics, "most_gaussians")));
   }
-  if (const double gain = gained_by_colors(metrics, settings); gain > kColorsDecibels) {
+  if (const double gain = gained_by_colors(views, metrics, settings); gain > kColorsDecibels) {
     out.push_back(fmt::format(
         "Held-out photos are {:.1f} dB nearer to the model once their colours are fitted, as where "
         "exposure or white balance changes between photos: try --exposure",

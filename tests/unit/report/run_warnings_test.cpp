@@ -191,6 +191,18 @@ TEST_CASE("a run whose held-out photos differ from the model by their colours na
     CHECK(!contains(page_of(psnr, corrected), "--exposure"));
   }
   CHECK(!contains(page_of(24.66, 26.8, 90), "--exposure"));
+  // Most views have to gain: what lies before two of seven cameras is no exposure.
+  const auto with_views = [&](double usual) {
+    std::string images;
+    for (int i = 0; i < 7; ++i) {
+      images += fmt::format(R"({}{{"psnr":24.66,"psnr_corrected":{}}})", i > 0 ? "," : "",
+                            24.66 + (i < 2 ? 5.0 : usual));
+    }
+    run.write("eval/iteration_300/metrics.json", R"({"images":[)" + images + "]}");
+    return page_of(24.66, 26.8);
+  };
+  CHECK(contains(with_views(2.0), "Held-out photos are 2.0 dB nearer"));
+  CHECK(!contains(with_views(0.9), "--exposure"));
   run.write("config.toml", "exposure = true\n");
   CHECK(!contains(page_of(24.66, 26.8), "try --exposure"));
 }

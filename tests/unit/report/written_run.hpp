@@ -34,6 +34,7 @@ class Run {
       write_image(eval / name, Image(12, 4, 3, 0.5f));
   }
   void write(const std::string& name, const std::string& text) const {
+    std::filesystem::create_directories((path_ / name).parent_path());
     std::ofstream(path_ / name, std::ios::binary) << text;
   }
   const std::filesystem::path& path() const { return path_; }
