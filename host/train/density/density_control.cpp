@@ -24,6 +24,7 @@ constexpr std::int64_t kLeastPeriod = 50;   // iterations between passes
 constexpr double kShortRunShare = 0.1;      // but not more than this share of a short run
 constexpr std::int64_t kShortPeriod = 10;   // and not less than these iterations
 constexpr double kPeriodShare = 0.01;       // of the run
+constexpr double kJustBelow = 0.7;          // of what a period is at least
 constexpr double kLongestPassShare = 0.05;  // longer passes over the photos are not waited for
 constexpr double kLeastOpacity = 0.004;     // that fading leaves
 constexpr double kMcmcGrowth = 1.05;        // of the count in a pass of 3DGS-MCMC, at least
@@ -40,7 +41,12 @@ std::int64_t fitted_period(std::int64_t iterations, std::int64_t views, std::int
       std::max(2 * least, static_cast<std::int64_t>(share(kLongestPassShare)));
   const std::int64_t pass = pass_steps(views, together);
   for (std::int64_t whole = (least + pass - 1) / pass * pass; whole <= most; whole += pass) {
-    if (shows_all(whole, views, together)) return whole;
+    if (!shows_all(whole, views, together)) continue;
+    // Twice as long is worse than a little shorter.
+    const std::int64_t before = whole - pass;
+    const bool nearer = static_cast<double>(whole) > static_cast<double>(least) / kJustBelow &&
+                        static_cast<double>(before) >= kJustBelow * static_cast<double>(least);
+    return nearer && shows_all(before, views, together) ? before : whole;
   }
   return least;
 }
