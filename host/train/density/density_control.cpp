@@ -30,9 +30,10 @@ constexpr double kLeastOpacity = 0.004;     // that fading leaves
 constexpr double kMcmcGrowth = 1.05;        // of the count in a pass of 3DGS-MCMC, at least
 
 // Iterations between two passes when the options leave them open.
-std::int64_t fitted_period(std::int64_t iterations, std::int64_t views, std::int64_t together) {
-  const auto share = [iterations](double s) {
-    return std::llround(s * static_cast<double>(iterations));
+std::int64_t fitted_period(const TrainOptions& options, std::int64_t views) {
+  const std::int64_t together = options.views_per_step;
+  const auto share = [&](double s) {
+    return std::llround(s * static_cast<double>(options.iterations));
   };
   const std::int64_t usual =
       std::clamp<std::int64_t>(share(kShortRunShare), kShortPeriod, kLeastPeriod);
@@ -42,11 +43,13 @@ std::int64_t fitted_period(std::int64_t iterations, std::int64_t views, std::int
   const std::int64_t pass = pass_steps(views, together);
   for (std::int64_t whole = (least + pass - 1) / pass * pass; whole <= most; whole += pass) {
     if (!shows_all(whole, views, together)) continue;
-    // Twice as long is worse than a little shorter.
+    // Short runs have few passes to grow in, and random starts are cleared by each: for these one
+    // that comes a little early is better than one that takes nearly twice as long.
+    const bool hurries = whole > share(kShortRunShare) || clears_random_start(options);
     const std::int64_t before = whole - pass;
     const bool nearer = static_cast<double>(whole) > static_cast<double>(least) / kJustBelow &&
                         static_cast<double>(before) >= kJustBelow * static_cast<double>(least);
-    return nearer && shows_all(before, views, together) ? before : whole;
+    return hurries && nearer && shows_all(before, views, together) ? before : whole;
   }
   return least;
 }
@@ -72,7 +75,7 @@ void DensityControl::follow(const TrainOptions& options, std::size_t views) {
   last_ = growth_end_;
   period_ = options.densify_every.of(options.iterations);
   const auto all = static_cast<std::int64_t>(std::max<std::size_t>(views, 1));
-  if (period_ == 0) period_ = fitted_period(options.iterations, all, options.views_per_step);
+  if (period_ == 0) period_ = fitted_period(options, all);
   decay_ = options.strategy == DensityStrategy::kBudget
                ? pass_decay(options, pass_steps(all, options.views_per_step))
                : 0;

@@ -390,8 +390,9 @@ TEST_CASE("a budget removes what is transparent or unseen and halves the highest
 
 TEST_CASE("passes come after whole passes over the photos, near the usual period [small]") {
   Context context(test_device());
-  const auto period = [&](std::int64_t iterations, std::size_t views) {
+  const auto period = [&](std::int64_t iterations, std::size_t views, const char* init = "auto") {
     TrainOptions options;
+    options.init = init;
     options.iterations = iterations;
     options.densify_from = 1;
     const DensityControl control(context, options, 1.0, views);
@@ -399,17 +400,21 @@ TEST_CASE("passes come after whole passes over the photos, near the usual period
     while (!control.refines_at(first)) ++first;
     return first;
   };
-  // 50 at least: one pass or several, or just below where one more would be far above.
+  // 50 at least: one pass or several.
   CHECK(period(1000, 60) == 60);
   CHECK(period(1000, 20) == 60);
   CHECK(period(1000, 12) == 60);
-  CHECK(period(1000, 30) == 60);
-  CHECK(period(1000, 43) == 43);
-  CHECK(period(1000, 36) == 36);
+  CHECK(period(1000, 43) == 86);
+  // Or just below, where one more would be far above, in short runs and from random starts.
+  CHECK(period(500, 60) == 60);
+  CHECK(period(500, 30) == 60);
+  CHECK(period(500, 43) == 43);
+  CHECK(period(500, 36) == 36);
+  CHECK(period(1000, 43, "random") == 43);
   // A tenth of short runs and a hundredth of long ones.
   CHECK(period(300, 43) == 43);
   CHECK(period(10000, 43) == 129);
-  CHECK(period(10000, 80) == 80);
+  CHECK(period(10000, 80) == 160);
 }
 
 TEST_CASE("the budget's count follows its curve to the limit and stays there [small]") {
