@@ -219,6 +219,12 @@ std::string blurred(const std::vector<Json>& photos) {
   return names_of(found);
 }
 
+/// Photos that show one colour, at large too, as behind a lens cap; noise may lie on it.
+std::string plain(const std::vector<Json>& photos) {
+  constexpr double kPlainOctaves = 8.0;
+  return names_of(far_below(photos, "coarse_sharpness", octaves, kPlainOctaves));
+}
+
 /// The PSNR of the photos from the nearest places that look the same way, at most so many.
 std::vector<double> psnr_beside(const std::vector<Json>& photos,
                                 const Json& photo,
@@ -276,6 +282,7 @@ void warn_of_views(const std::vector<Json>& views,
   warn(
       "Views far worse than the others; pose or photo may be wrong, or few photos show that part: ",
       names_of(far_below(views, "psnr", itself, kOddDecibels)));
+  warn("Training photos of one colour, which hide what is there: leave them out: ", plain(photos));
   warn("Held-out photos less sharp than the others: ", blurred(views));
   warn("Training photos less sharp than the others, which blur the model: ", blurred(photos));
   warn(

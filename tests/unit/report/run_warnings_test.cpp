@@ -125,9 +125,9 @@ TEST_CASE("a run whose held-out photos fit where they are shifted names --poses"
   CHECK_FALSE(names_poses(3, 50, "false"));
 }
 
-TEST_CASE("a photo of a plain wall is not called blurred") {
+TEST_CASE("a photo of a plain wall is not called blurred, one of a lens cap is named") {
   const Run run;
-  const auto is_blurred = [&](double sharpness, double coarse) {
+  const auto is_named = [&](const char* warning, double sharpness, double coarse) {
     std::string list;
     for (int i = 0; i < 9; ++i)
       list += fmt::format(R"({{"name":"{}.png","sharpness":{},"coarse_sharpness":0.2}},)", i,
@@ -135,12 +135,22 @@ TEST_CASE("a photo of a plain wall is not called blurred") {
     run.write("metrics.json", fmt::format(R"({{"complete":true,"photos":[{}
                 {{"name":"last.png","sharpness":{},"coarse_sharpness":{}}}]}})",
                                           list, sharpness, coarse));
-    return contains(run_report(run.path()), "which blur the model: last.png.");
+    return contains(run_report(run.path()), warning + std::string(": last.png."));
+  };
+  const auto is_blurred = [&](double sharpness, double coarse) {
+    return is_named("which blur the model", sharpness, coarse);
   };
   CHECK(is_blurred(0.005, 0.2));
   CHECK(is_blurred(0.005, 0.05));
   CHECK_FALSE(is_blurred(0.005, 0.02));
   CHECK_FALSE(is_blurred(0.05, 0.5));
+  const auto is_plain = [&](double sharpness, double coarse) {
+    return is_named("of one colour, which hide what is there: leave them out", sharpness, coarse);
+  };
+  CHECK(is_plain(0, 0));
+  CHECK_FALSE(is_blurred(0, 0));
+  CHECK(is_plain(0.001, 0.00003));  // noise of a black photo
+  CHECK_FALSE(is_plain(0.001, 0.003));
 }
 
 TEST_CASE("a photo is compared with those beside it that look the same way") {
