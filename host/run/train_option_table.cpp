@@ -344,7 +344,7 @@ void add_density_options(TrainTable& t, TrainOptions& o) {
   t.share("densify-until", o.densify_until, true, "last one that may; 0 = never");
   t.share("densify-every", o.densify_every, true,
           "iterations (or share of the run) between two passes; 0 = whole passes over the photos, "
-          "at least 50 iterations (a tenth of a run below 500) and a hundredth of the run");
+          "at least some 50 iterations (a tenth of a run below 500) and a hundredth of the run");
   t.share("replace-until", o.replace_until, true,
           "up to here (share of the run, or iteration) passes of the budget and mcmc strategies go "
           "on without growth: what they remove is replaced");
