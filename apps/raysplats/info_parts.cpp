@@ -138,7 +138,10 @@ std::optional<Json> describe_record(const nlohmann::json& json, const fs::path& 
   }
   if (json.contains("images") && json["images"].is_array() && json.contains("psnr")) {
     out = {{"type", "metrics of an evaluation"}, {"views", json["images"].size()}};
-    copy_plain(json, {"psnr", "psnr_corrected", "psnr_aligned", "psnr_all", "ssim", "lpips"}, out);
+    copy_plain(
+        json,
+        {"psnr", "psnr_corrected", "psnr_shifted", "psnr_aligned", "psnr_all", "ssim", "lpips"},
+        out);
     return out;
   }
   const bool exposures =

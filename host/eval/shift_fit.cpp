@@ -80,7 +80,9 @@ std::array<double, Size> sum_rows(int height, const Add& add) {
   const auto rows = static_cast<std::size_t>(height);
   std::vector<std::array<double, Size>> parts((rows + kRows - 1) / kRows);
   in_chunks(rows, kRows, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t y = begin; y < end; ++y) add(static_cast<int>(y), parts[begin / kRows]);
+    std::array<double, Size> sums{};
+    for (std::size_t y = begin; y < end; ++y) add(static_cast<int>(y), sums);
+    parts[begin / kRows] = sums;
   });
   std::array<double, Size> out{};
   for (const std::array<double, Size>& part : parts) {

@@ -17,7 +17,7 @@ struct ShiftFit {
 /// By Gauss and Newton's steps on brightness, first on reduced pictures (Lucas and Kanade 1981;
 /// Bouguet 2001). Errors of a camera's turn, and largely of its place, are such shifts; models of
 /// sound poses gain less than 0.2 dB of a photo. Pictures of equal size, `weight` of one channel.
-/// On all cores; their number does not change a bit.
+/// The number of cores does not change a bit.
 ShiftFit fit_shift(const Image& image, const Image& photo, const Image& weight);
 
 }  // namespace raysplats

@@ -159,8 +159,9 @@ double gained_by_colors(const std::vector<Json>& views,
   return std::min(fitted - plain, usual_gain_by_colors(views).value_or(fitted - plain));
 }
 
-/// How much nearer held-out photos are to the model once each is shifted in its plane, in dB, and
-/// by how many pixels in the median; nothing of an older run, or one that has just begun.
+/// How much nearer held-out photos are to the model once each is shifted in its plane, in dB, in
+/// the mean and in the median, and by how many pixels in the median; nothing of an older run, or
+/// one that has just begun.
 std::optional<std::pair<double, double>> gained_by_shift(const std::vector<Json>& views,
                                                          const Json& metrics,
                                                          const Settings& settings) {
@@ -172,19 +173,20 @@ std::optional<std::pair<double, double>> gained_by_shift(const std::vector<Json>
   const double iteration = number(evaluations.back(), "iteration");
   if (iteration < kSteps || !has_visited(metrics, settings, iteration, kVisits))
     return std::nullopt;
-  double gain = 0;
-  std::vector<double> pixels;
+  double sum = 0;
+  std::vector<double> gains, pixels;
   for (const Json& view : views) {
     const auto shift = view.find("shift");
     if (shift == view.end() || !shift->is_array() || shift->size() != 2 ||
         !(*shift)[0].is_number() || !(*shift)[1].is_number())
       continue;
-    gain += number(view, "psnr_shifted") - number(view, "psnr");
+    gains.push_back(number(view, "psnr_shifted") - number(view, "psnr"));
+    sum += gains.back();
     pixels.push_back(std::hypot((*shift)[0].get<double>(), (*shift)[1].get<double>()));
   }
   if (pixels.empty()) return std::nullopt;
-  gain /= static_cast<double>(pixels.size());
-  return std::pair(gain, median(std::move(pixels)));
+  const double mean = sum / static_cast<double>(gains.size());
+  return std::pair(std::min(mean, median(std::move(gains))), median(std::move(pixels)));
 }
 
 /// Whether the limit has cut off growth. The other strategies go there by plan.
@@ -215,7 +217,10 @@ std::string blurred(const std::vector<Json>& photos) {
   }
   if (usual.empty()) return names_of(found);  // of a run before both were measured
   const double middle = median(std::move(usual));
-  std::erase_if(found, [&](const Json& photo) { return lost(photo) < middle + kLostOctaves; });
+  // What an older version has read of a run, and this one has not yet, tells less.
+  std::erase_if(found, [&](const Json& photo) {
+    return photo.contains("coarse_sharpness") && lost(photo) < middle + kLostOctaves;
+  });
   return names_of(found);
 }
 

@@ -337,8 +337,8 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
 }
 
 // Keeps a run by time to its time: its last steps are alike, and once a part of them is timed the
-// time that is left tells how many more there can be; some in any case, in which rates come to
-// their end and the model's mean is taken. What the steps do depends on the schedules
+// time that is left tells how many more there can be; some in any case, of which the model's
+// mean is taken. What the steps do depends on the schedules
 // alone, so that a run which is given this end from the beginning has the same bytes. Returns
 // whether the run now has another end.
 bool Trainer::Impl::fit_end_to_time() {

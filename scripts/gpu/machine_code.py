@@ -30,7 +30,7 @@ def intel(folder):
     return out
 
 
-# The lowest nine bits of an instruction of sm_70 to sm_90, as ptxas writes them for programs of one such instruction each.
+# The lowest nine bits of an instruction of sm_70 to sm_120, as ptxas writes them for programs of one such instruction each.
 RED, ATOMG, ATOM, ATOMG_CAS, ATOM_CAS, REDG_FLOAT, ATOMG_FLOAT, BARRIER = 0x18e, 0x1a8, 0x18a, 0x1a9, 0x18b, 0x1a6, 0x1a3, 0x11d
 FLOAT = 3  # type of an operand of RED, ATOMG and ATOM
 

@@ -99,6 +99,13 @@ def _once(cache, name, unpack):
         shutil.rmtree(scratch, ignore_errors=True)
 
 
+def installed(vendor):
+    """The root of a compiler that this system has, of Intel's alone."""
+    if not os.path.exists("/usr/bin/ocloc"):
+        raise Missing(f"{vendor}: there is no /usr/bin/ocloc (Debian: intel-ocloc and libigdfcl2)")
+    return ""
+
+
 def _of_release(release, cache):
     """What tells apt-get to take packages from a release that this system's sources do not name, by its own lists of them."""
     sites = subprocess.run(["apt-get", "indextargets", "--format", "$(SITE)"], capture_output=True, text=True, check=False).stdout.split()

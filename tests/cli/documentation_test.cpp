@@ -107,6 +107,7 @@ const std::vector<std::pair<std::string, std::string>> kNotRun{
     {"cmake -S apps/examples", "tested by the test 'package'"},
     {"./scripts/gpu_path.sh", "another build of the driver; run by scripts/ci.sh"},
     {"scripts/gpu_path.sh", "another build of the driver; run by scripts/ci.sh"},
+    {"scripts/other_system.sh ", "installs another system"},
     {"scripts/implementations.sh", "downloads OpenCL implementations; run by scripts/ci.sh"},
     {"./scripts/gpu_compile.py", "downloads compilers; run by scripts/ci.sh"},
     {"scripts/gpu_compile.py", "downloads compilers; run by scripts/ci.sh"},

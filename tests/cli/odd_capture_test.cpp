@@ -303,6 +303,8 @@ TEST_CASE("a cap below the start takes a part of it, and never what was asked fo
   make_data(data);
   check_refusal(train(data, folder / "count", {"-q", "--init-count", "50", "--max-gaussians", "8"}),
                 2, "'init-count' = 50 Gaussians is above 'max-gaussians' = 8");
+  check_refusal(train(data, folder / "typo", {"-q", "--init", "point"}), 3,
+                "The start 'point' is neither a file that exists nor one of auto, colmap, photos");
   write_file(folder / "model.ply", ply_file(20));
   const Words from_model{"--init", folder / "model.ply", "--max-gaussians", "8"};
   const Outcome outcome = train(data, folder / "model", from_model);

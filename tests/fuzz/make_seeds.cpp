@@ -230,7 +230,7 @@ void make_runs(const fs::path& root) {
 "psnr_rise":true,"evaluations":[1,{"iteration":"2","psnr":null}]})");
   add("views", 1,
       R"({"images":[{"name":"a<script>.png","psnr":30,"ssim":0.9,"picture":"a.png",
-"center":[1,2,3],"sharpness":0.1}]})");
+"center":[1,2,3],"sharpness":0.1,"coarse_sharpness":0.2,"psnr_shifted":31,"shift":[0.5,1]}]})");
   add("views_of_other_types", 1, R"({"images":[{"name":7,"picture":["a.png"],"psnr":"30"},[]]})");
   add("rows", 2, "iteration,seconds,loss,psnr,gaussians,it_per_s\n10,1.5,0.5,12,100,7\n20,cut");
   add("cameras", 4,

@@ -23,7 +23,8 @@ def png(width, height):
 
 
 def write_run(folder, seed=0):
-    views = [{"name": f"{HOSTILE} {i}{WIDE}", "psnr": 20 + (7 * i + seed) % 10, "ssim": 0.8, "sharpness": 0.01,
+    views = [{"name": f"{HOSTILE} {i}{WIDE}", "psnr": 20 + (7 * i + seed) % 10, "ssim": 0.8, "sharpness": 0.01, "coarse_sharpness": 0.02,
+              "psnr_shifted": 25, "shift": [1, "0"] if i == 4 else [0.5, i], "direction": [0, 0, 1],
               "center": [i, i % 3, 1], "picture": f"{i}.png"} for i in range(9)]
     views.append({"name": HOSTILE + WIDE, "psnr": 3, "ssim": 0.1, "sharpness": 1e-7, "center": [9, 9, 9]})
     metrics = {

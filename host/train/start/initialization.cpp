@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -27,6 +26,7 @@
 #include "train/start/point_cloud.hpp"
 #include "train/start/pose_check.hpp"
 #include "train/start/sparse_start.hpp"
+#include "util/file_kind.hpp"
 #include "util/parallel.hpp"
 
 namespace raysplats {
@@ -79,10 +79,7 @@ PointCloud photo_points(const Dataset& dataset,
       found.nearest, found.farthest, found.typical, guess,
       found.open ? "; they leave depths open" : "");
   PointCloud foreground;
-  if (found.open) {
-    if (const std::optional<DepthRange> near = foreground_depths(photos, guess, seed))
-      foreground = swept_points(photos, *near, count / 2, 0.0, seed).points;
-  }
+  if (found.open) foreground = foreground_points(photos, guess, count / 2, seed);
   SweptPoints swept = swept_points(photos, found, count - foreground.size(), unsure, seed);
   if (foreground.size() > 0) {
     spdlog::debug("{} points of the start stand before what is too far to tell its depth",
@@ -99,7 +96,7 @@ Gaussians given_model(const Dataset& dataset,
                       std::size_t limit,
                       const TrainOptions& options) {
   constexpr double kLeastSeen = 0.01;  // what photos of a model's scene see more of
-  if (!std::filesystem::exists(options.init)) {
+  if (!is_there(options.init)) {
     throw DataError(fmt::format(
         "The start '{}' is neither a file that exists nor one of auto, colmap, photos and random",
         options.init));

@@ -263,9 +263,15 @@ Probe probe_pixel(std::span<const SmallPhoto> photos,
   return {depths.at(best, kProbeDepths), open};
 }
 
+// Whether a depth is at an end of the range, where what lies beyond piles up.
+bool at_end(double depth, const DepthRange& depths) {
+  return depth < kEnd * depths.nearest || kEnd * depth > depths.farthest;
+}
+
 // How many of some pixels agree in a depth, and in which.
 struct Agreement {
-  std::size_t inside = 0;  // not at an end of the range, where what lies beyond piles up
+  std::size_t shown = 0;   // pixels that show something
+  std::size_t inside = 0;  // not at_end()
   double depth = 0;        // the median; 0 of too few
 };
 
@@ -279,10 +285,9 @@ Agreement agreement(std::span<const SmallPhoto> photos,
   for (const Sample& sample : sweep.samples()) {
     if (!sample.agreed) continue;
     found.push_back(sample.depth);
-    const bool at_end =
-        sample.depth < kEnd * depths.nearest || kEnd * sample.depth > depths.farthest;
-    out.inside += at_end ? 0 : 1;
+    out.inside += at_end(sample.depth, depths) ? 0 : 1;
   }
+  out.shown = sweep.agreed() + sweep.vague();
   if (found.size() >= kFewProbes) out.depth = median(std::move(found));
   return out;
 }
@@ -357,14 +362,6 @@ DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::u
   return better ? settled(photos, farther, seed).depths : near.depths;
 }
 
-std::optional<DepthRange> foreground_depths(std::span<const SmallPhoto> photos,
-                                            double guess,
-                                            std::uint64_t seed) {
-  const Settled near = settled(photos, depths_around(guess), seed);
-  const double share = static_cast<double>(near.agreement.inside) / static_cast<double>(kProbes);
-  return share > kForegroundShare ? std::optional(near.depths) : std::nullopt;
-}
-
 SweptPoints probe_sweep(std::span<const SmallPhoto> photos,
                         const DepthRange& depths,
                         std::uint64_t seed) {
@@ -421,6 +418,25 @@ SweptPoints swept_points(std::span<const SmallPhoto> photos,
   });
   SweptPoints out{sweep.agreed_share(), {}};
   for (const Sample& sample : taken) append_point(out.points, sample.position(), sample.color());
+  return out;
+}
+
+PointCloud foreground_points(std::span<const SmallPhoto> photos,
+                             double guess,
+                             std::size_t count,
+                             std::uint64_t seed) {
+  const auto [depths, found] = settled(photos, depths_around(guess), seed);
+  PointCloud out;
+  if (static_cast<double>(found.inside) <= kForegroundShare * static_cast<double>(found.shown))
+    return out;
+  Sweep sweep(photos, depths, seed);
+  for (std::size_t tried = 0; tried < kTriesPerPoint && sweep.agreed() < count; ++tried)
+    sweep.take(count);
+  for (const Sample& sample : sweep.samples()) {
+    if (out.size() == count) break;
+    if (sample.agreed && !at_end(sample.depth, depths))
+      append_point(out, sample.position(), sample.color());
+  }
   return out;
 }
 

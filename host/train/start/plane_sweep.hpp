@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 
 #include "raysplats/dataset.hpp"
@@ -21,12 +20,6 @@ DepthRange depths_around(double typical);
 /// cameras have no common target, it lies around their depth; likewise where clearly more of them
 /// agree about a farther one, as from cameras turned at arm's length. `guess` is positive.
 DepthRange swept_depths(std::span<const SmallPhoto> photos, double guess, std::uint64_t seed);
-
-/// The range about the depth of what stands before an open one, as a terrace before far mountains:
-/// nothing where next to no pixels agree about any.
-std::optional<DepthRange> foreground_depths(std::span<const SmallPhoto> photos,
-                                            double guess,
-                                            std::uint64_t seed);
 
 /// What a sweep finds.
 struct SweptPoints {
@@ -55,5 +48,13 @@ SweptPoints swept_points(std::span<const SmallPhoto> photos,
                          std::size_t count,
                          double unsure,
                          std::uint64_t seed);
+
+/// Points, `count` at most, of what stands before an open range, as a terrace before far mountains:
+/// what agrees about a depth around those that photos agree about nearest to `guess`. None where
+/// next to no pixels agree about any.
+PointCloud foreground_points(std::span<const SmallPhoto> photos,
+                             double guess,
+                             std::size_t count,
+                             std::uint64_t seed);
 
 }  // namespace raysplats

@@ -103,11 +103,13 @@ TEST_CASE("a run that has seen its photos a few times warns of those alone that 
 
 TEST_CASE("a run whose held-out photos fit where they are shifted names --poses") {
   const Run run;
-  const auto names_poses = [&](double gain, int iteration, const std::string& poses) {
+  const auto names_poses = [&](double gain, int iteration, const std::string& poses,
+                               double other = 0) {
     std::string images;
     for (const double pixels : {0.5, 1.2, 2.0}) {
       images += fmt::format(R"({}{{"psnr":24,"psnr_shifted":{},"shift":[{},0]}})",
-                            images.empty() ? "" : ",", 24 + gain, pixels);
+                            images.empty() ? "" : ",",
+                            24 + (other > 0 && pixels != 1.2 ? other : gain), pixels);
     }
     run.write(fmt::format("eval/iteration_{}/metrics.json", iteration),
               fmt::format(R"({{"images":[{}]}})", images));
@@ -123,6 +125,8 @@ TEST_CASE("a run whose held-out photos fit where they are shifted names --poses"
   CHECK_FALSE(names_poses(0.4, 301, "false"));
   CHECK_FALSE(names_poses(3, 302, "true"));
   CHECK_FALSE(names_poses(3, 50, "false"));
+  // One photo with a wrong pose is none of all.
+  CHECK_FALSE(names_poses(5, 303, "false", 0.1));
 }
 
 TEST_CASE("a photo of a plain wall is not called blurred, one of a lens cap is named") {
@@ -151,6 +155,12 @@ TEST_CASE("a photo of a plain wall is not called blurred, one of a lens cap is n
   CHECK_FALSE(is_blurred(0, 0));
   CHECK(is_plain(0.001, 0.00003));  // noise of a black photo
   CHECK_FALSE(is_plain(0.001, 0.003));
+  // Photos that an older version has read have one number alone.
+  run.write("metrics.json", R"({"complete":true,"photos":[
+    {"name":"0.png","sharpness":0.05,"coarse_sharpness":0.2},{"name":"1.png","sharpness":0.06},
+    {"name":"2.png","sharpness":0.05},{"name":"3.png","sharpness":0.06},
+    {"name":"4.png","sharpness":0.05},{"name":"old.png","sharpness":0.002}]})");
+  CHECK(contains(run_report(run.path()), "which blur the model: old.png."));
 }
 
 TEST_CASE("a photo is compared with those beside it that look the same way") {
