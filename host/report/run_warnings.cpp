@@ -128,15 +128,30 @@ bool has_visited(const Json& metrics, const Settings& settings, double iteration
   return iteration * views.value_or(1.0) >= std::min(times * photos, kManyViews);
 }
 
-/// The median of what views gain once their colours are fitted, in dB: haze before a few cameras is
-/// no exposure. Nothing where no view tells.
-std::optional<double> usual_gain_by_colors(const std::vector<Json>& views) {
+/// Whether held-out photos tell of exposure or poses: a run that does not train these (an `option`)
+/// has looked at them when its model was no longer on its way.
+bool tells_without(const char* option, const Json& metrics, const Settings& settings) {
+  constexpr double kSteps = 100, kVisits = 3;
+  const std::vector<Json> evaluations = objects(metrics, "evaluations");
+  const auto trained = settings.find(option);
+  if (evaluations.empty() || (trained != settings.end() && trained->second == "true")) return false;
+  const double iteration = number(evaluations.back(), "iteration");
+  return iteration >= kSteps && has_visited(metrics, settings, iteration, kVisits);
+}
+
+/// What views gain over their PSNR by another one, in dB: in the mean, but in the median where that
+/// is less, as what concerns a few of them is no matter of all. Nothing where no view has it.
+std::optional<double> usual_gain(const std::vector<Json>& views, const char* key) {
+  double sum = 0;
   std::vector<double> gains;
   for (const Json& view : views) {
-    if (view.contains("psnr") && view.contains("psnr_corrected"))
-      gains.push_back(number(view, "psnr_corrected") - number(view, "psnr"));
+    if (!view.contains("psnr") || !view.contains(key)) continue;
+    gains.push_back(number(view, key) - number(view, "psnr"));
+    sum += gains.back();
   }
-  return gains.empty() ? std::nullopt : std::optional(median(std::move(gains)));
+  if (gains.empty()) return std::nullopt;
+  const double mean = sum / static_cast<double>(gains.size());
+  return std::min(mean, median(std::move(gains)));
 }
 
 /// How much nearer held-out photos are to the model once their colours are fitted, in dB, where
@@ -144,49 +159,36 @@ std::optional<double> usual_gain_by_colors(const std::vector<Json>& views) {
 double gained_by_colors(const std::vector<Json>& views,
                         const Json& metrics,
                         const Settings& settings) {
-  constexpr double kSteps = 100, kVisits = 3;  // before that colours are still on their way
   constexpr double kNear = 22;     // dB; fitted colours bring any photo near to a model that fails
   constexpr double kSeen = 0.025;  // root of the mean square; less is nothing of a dark scene
-  const std::vector<Json> evaluations = objects(metrics, "evaluations");
-  const auto exposure = settings.find("exposure");
-  if (evaluations.empty() || (exposure != settings.end() && exposure->second == "true")) return 0;
-  const Json& last = evaluations.back();
-  const double iteration = number(last, "iteration");
-  if (iteration < kSteps || !has_visited(metrics, settings, iteration, kVisits)) return 0;
+  if (!tells_without("exposure", metrics, settings)) return 0;
+  const Json last = objects(metrics, "evaluations").back();
   const double plain = number(last, "psnr"), fitted = number(last, "psnr_corrected");
   const double square = std::pow(10.0, -plain / 10.0) - std::pow(10.0, -fitted / 10.0);
   if (fitted < kNear || square <= kSeen * kSeen) return 0;
-  return std::min(fitted - plain, usual_gain_by_colors(views).value_or(fitted - plain));
+  return usual_gain(views, "psnr_corrected").value_or(fitted - plain);
 }
 
-/// How much nearer held-out photos are to the model once each is shifted in its plane, in dB, in
-/// the mean and in the median, and by how many pixels in the median; nothing of an older run, or
-/// one that has just begun.
-std::optional<std::pair<double, double>> gained_by_shift(const std::vector<Json>& views,
-                                                         const Json& metrics,
-                                                         const Settings& settings) {
-  constexpr double kSteps = 100, kVisits = 3;
-  const std::vector<Json> evaluations = objects(metrics, "evaluations");
-  const auto poses = settings.find("poses");
-  if (evaluations.empty() || (poses != settings.end() && poses->second == "true"))
-    return std::nullopt;
-  const double iteration = number(evaluations.back(), "iteration");
-  if (iteration < kSteps || !has_visited(metrics, settings, iteration, kVisits))
-    return std::nullopt;
-  double sum = 0;
-  std::vector<double> gains, pixels;
+/// How much nearer held-out photos are to the model once each is shifted in its plane, in dB; 0
+/// where that tells nothing of poses.
+double gained_by_shift(const std::vector<Json>& views,
+                       const Json& metrics,
+                       const Settings& settings) {
+  if (!tells_without("poses", metrics, settings)) return 0;
+  return usual_gain(views, "psnr_shifted").value_or(0);
+}
+
+/// By how many pixels views are shifted then, in the median; 0 where none says so.
+double usual_shift(const std::vector<Json>& views) {
+  std::vector<double> pixels;
   for (const Json& view : views) {
     const auto shift = view.find("shift");
     if (shift == view.end() || !shift->is_array() || shift->size() != 2 ||
         !(*shift)[0].is_number() || !(*shift)[1].is_number())
       continue;
-    gains.push_back(number(view, "psnr_shifted") - number(view, "psnr"));
-    sum += gains.back();
     pixels.push_back(std::hypot((*shift)[0].get<double>(), (*shift)[1].get<double>()));
   }
-  if (pixels.empty()) return std::nullopt;
-  const double mean = sum / static_cast<double>(gains.size());
-  return std::pair(std::min(mean, median(std::move(gains))), median(std::move(pixels)));
+  return pixels.empty() ? 0 : median(std::move(pixels));
 }
 
 /// Whether the limit has cut off growth. The other strategies go there by plan.
@@ -365,12 +367,11 @@ std::vector<std::string> warnings_of(const Json& metrics,
         "exposure or white balance changes between photos: try --exposure",
         gain));
   }
-  if (const auto gain = gained_by_shift(views, metrics, settings);
-      gain && gain->first > kShiftDecibels) {
+  if (const double gain = gained_by_shift(views, metrics, settings); gain > kShiftDecibels) {
     out.push_back(fmt::format(
         "Held-out photos are {:.1f} dB nearer to the model once each is shifted, by {:.1f} pixels "
         "in the median, as where poses are inexact: try --poses",
-        gain->first, gain->second));
+        gain, usual_shift(views)));
   }
   warn_of_views(views, metrics, settings, out);
   return out;
