@@ -38,20 +38,12 @@ std::vector<std::string> names_of(const std::string& option,
 }
 
 std::size_t parse_count(const std::string& option, const std::string& text) {
-  double factor = 1;
-  std::string digits = text;
-  if (!digits.empty() && (digits.back() == 'k' || digits.back() == 'M')) {
-    factor = digits.back() == 'k' ? 1e3 : 1e6;
-    digits.pop_back();
-  }
-  double value = 0;
-  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (error != std::errc() || end != digits.data() + digits.size() || !(value * factor >= 1) ||
-      value * factor > 1e9) {
+  const std::optional<std::uint64_t> value = parse_natural(text);
+  if (!value || *value < 1 || *value > 1'000'000'000) {
     throw UsageError(
         fmt::format("{} '{}' is no number of Gaussians, as in 10000, 100k or 1M", option, text));
   }
-  return static_cast<std::size_t>(value * factor);
+  return static_cast<std::size_t>(*value);
 }
 
 double parse_duration(const std::string& option, const std::string& text) {

@@ -6,7 +6,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
@@ -28,11 +27,11 @@ constexpr double kMostScaleMin = 1e6;
 
 // A share of the run (below 1) or a whole number of iterations.
 RunShare parse_share(const std::string& key, const std::string& text, bool may_be_none) {
-  const std::optional<double> number = parse_real(text);
-  const double value = number.value_or(-1);
-  const bool whole = value >= 1 && value <= kMaxCount && value == std::floor(value);
+  const std::optional<std::int64_t> count = parse_whole(text);
+  const double value = count ? static_cast<double>(*count) : parse_real(text).value_or(-1);
+  const bool whole = count && value >= 1 && value <= kMaxCount;
   const bool share = value > 0 && value < 1;
-  if (!number || !(whole || share || (may_be_none && value == 0))) {
+  if (!(whole || share || (may_be_none && value == 0))) {
     throw UsageError(
         fmt::format("The option '{}' needs a share of the run below 1 or a whole number of "
                     "iterations{}, not '{}'",

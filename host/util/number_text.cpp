@@ -41,15 +41,28 @@ std::optional<T> parse_all(const std::string& text) {
   return value;
 }
 
+/// What a letter for thousands or millions at the end stands for, which is taken off.
+double take_factor(std::string_view& text) {
+  if (text.size() < 2 || kDigits.find(text[text.size() - 2]) == std::string_view::npos) return 1;
+  const double factor = text.back() == 'k' ? 1e3 : text.back() == 'M' ? 1e6 : 1;
+  if (factor > 1) text.remove_suffix(1);
+  return factor;
+}
+
 template <class T>
 std::optional<T> parse_integer(std::string_view text) {
-  const std::string digits = plain(text);
-  if (const std::optional<T> value = parse_all<T>(digits)) return value;
+  if (const std::optional<T> value = parse_all<T>(plain(text))) return value;
   constexpr double kExact = 9007199254740992.0;  // 2^53: larger ones are not what was written
+  const double factor = take_factor(text);
   const std::optional<double> real = parse_real(text);
-  if (!real || *real != std::floor(*real) || std::abs(*real) > kExact) return std::nullopt;
-  if (std::is_unsigned_v<T> && *real < 0) return std::nullopt;
-  return static_cast<T>(*real);
+  if (!real) return std::nullopt;
+  // 0.29M is 290 000, though the product of the two is not quite.
+  const double value = std::round(*real * factor);
+  if (std::abs(value) > kExact || std::abs(value - *real * factor) > 1e-9 * (factor - 1)) {
+    return std::nullopt;
+  }
+  if (std::is_unsigned_v<T> && value < 0) return std::nullopt;
+  return static_cast<T>(value);
 }
 
 }  // namespace
@@ -128,7 +141,7 @@ bool is_number_or_pair(std::string_view text) {
   if (const std::size_t colon = text.find(':'); colon != std::string_view::npos) {
     return is_number_or_pair(text.substr(0, colon)) && is_number_or_pair(text.substr(colon + 1));
   }
-  if (text.ends_with('k') || text.ends_with('M')) text.remove_suffix(1);
+  take_factor(text);
   return parse_real(text).has_value();
 }
 

@@ -22,7 +22,7 @@ std::string counted(double count, std::string_view one, std::string_view many = 
 
 /// The number that the whole of a text is, in the spellings of TOML (1_000, 1e4) and of shells;
 /// none for any other text and for numbers that are not finite. Whole numbers may be written as
-/// 1e4.
+/// 1e4 and with a letter for thousands or millions behind them, as in 10k and 1.5M.
 std::optional<double> parse_real(std::string_view text);
 std::optional<std::int64_t> parse_whole(std::string_view text);
 std::optional<std::uint64_t> parse_natural(std::string_view text);
