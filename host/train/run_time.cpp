@@ -27,6 +27,8 @@ constexpr double kBeyond = 1.1;
 constexpr double kLarge = 0.5;         // of the largest view: steps that tell the speed
 constexpr std::int64_t kSlices = 400;  // of a run, when its steps are added up
 constexpr std::int64_t kMostIterations = 10'000'000;
+constexpr double kLatestEnd = 2;  // of the iterations that were planned
+constexpr double kGrace = 0.07;   // of the time that a slow run takes on for its last steps
 
 // When photos begin to have their full size, as a share of the run.
 double full_size_from(const TrainOptions& options) {
@@ -128,6 +130,14 @@ std::int64_t iterations_within(double seconds,
     }
   }
   return low;
+}
+
+std::int64_t fitted_end(const SteadyPace& pace, std::int64_t planned, double run_seconds) {
+  const auto now = static_cast<double>(pace.iteration);
+  const auto all = static_cast<double>(planned);
+  const double least = std::min(pace.seconds_of_step * (all - now), kGrace * run_seconds);
+  const double more = std::max(run_seconds - pace.seconds, least) / pace.seconds_of_step;
+  return static_cast<std::int64_t>(std::clamp(now + more, now + 1, kLatestEnd * all));
 }
 
 }  // namespace raysplats

@@ -78,4 +78,17 @@ std::int64_t iterations_within(double seconds,
                                std::int64_t least,
                                const std::function<double(std::int64_t)>& seconds_of);
 
+/// How far a run of a given time is when its last steps, which are alike, have been timed.
+struct SteadyPace {
+  std::int64_t iteration = 0;   ///< of the run, so far
+  double seconds = 0;           ///< spent so far
+  double seconds_of_step = 0;   ///< from here on
+};
+
+/// The iteration that a run which was planned with `planned` iterations ends with, so that it
+/// takes `run_seconds`: at most twice as many as planned. A run that is slower than planned makes
+/// as many further steps of the planned ones as 0.07 of its time has room for, even where none is
+/// left: its model is the mean of its last steps.
+std::int64_t fitted_end(const SteadyPace& pace, std::int64_t planned, double run_seconds);
+
 }  // namespace raysplats

@@ -30,8 +30,6 @@ constexpr std::int64_t kLeastIterations = 10;
 constexpr double kShortRun = 20;    // seconds of a run that is not worth more measuring
 constexpr double kFillShare = 0.5;  // of the limit that a start takes at most
 constexpr std::int64_t kFewIterations = 500;
-constexpr double kLatestEnd = 2;         // of the iterations that were planned
-constexpr double kGrace = 0.07;          // of the time that a slow run takes on for its last steps
 constexpr double kTellingChange = 0.03;  // of them, that users are told of
 
 void require_end(double seconds) {
@@ -337,8 +335,7 @@ RunEstimate Trainer::Impl::fit_time(double seconds) {
 }
 
 // Keeps a run by time to its time: its last steps are alike, and once a part of them is timed the
-// time that is left tells how many more there can be; some in any case, of which the model's
-// mean is taken. What the steps do depends on the schedules
+// time that is left tells how many more there can be. What the steps do depends on the schedules
 // alone, so that a run which is given this end from the beginning has the same bytes. Returns
 // whether the run now has another end.
 bool Trainer::Impl::fit_end_to_time() {
@@ -354,13 +351,9 @@ bool Trainer::Impl::fit_end_to_time() {
   finish_steps();
   const double now = clock.training.seconds();
   const double step = (now - *clock.steady_seconds) / static_cast<double>(until - from);
-  const double planned = step * static_cast<double>(options.iterations - until);
-  const double least = std::min(planned, kGrace * *clock.run_seconds);
-  const double more = std::max(*clock.run_seconds - now, least) / step;
-  const auto latest = kLatestEnd * static_cast<double>(options.iterations);
-  const double end =
-      std::clamp(static_cast<double>(iteration) + more, static_cast<double>(iteration) + 1, latest);
-  options.end_iteration = static_cast<std::int64_t>(ranks.broadcast_value(0, end));
+  const std::int64_t end =
+      fitted_end({iteration, now, step}, options.iterations, *clock.run_seconds);
+  options.end_iteration = ranks.broadcast_value(0, end);
   run.write_config(options);
   return true;
 }

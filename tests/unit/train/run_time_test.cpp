@@ -70,6 +70,20 @@ TEST_CASE("the work of steps that were measured is found within a twelfth [small
   }
 }
 
+TEST_CASE("a run by time ends with its time, and has some last steps at any rate [small]") {
+  // As planned, faster, and so fast that twice the iterations would not do.
+  CHECK(fitted_end({700, 70, 0.1}, 1000, 100) == 1000);
+  CHECK(fitted_end({700, 40, 0.05}, 1000, 100) == 1900);
+  CHECK(fitted_end({700, 5, 0.01}, 1000, 100) == 2000);
+  // Slower: with 9 s left, with 1 s, and beyond its time, where 7 s of 100 are taken on.
+  CHECK(fitted_end({700, 91, 0.125}, 1000, 100) == 772);
+  CHECK(fitted_end({700, 99, 0.125}, 1000, 100) == 756);
+  CHECK(fitted_end({700, 130, 0.125}, 1000, 100) == 756);
+  // No more than were planned, and one where a step takes longer than that.
+  CHECK(fitted_end({980, 130, 0.125}, 1000, 100) == 1000);
+  CHECK(fitted_end({700, 130, 25}, 1000, 100) == 701);
+}
+
 TEST_CASE("rates rise to what trained models have [small] [tiny]") {
   const RateCurve thin = expected_rates({9, 0.5}, {8, 1}, 1.0);
   CHECK(thin.first.hits == 9);
