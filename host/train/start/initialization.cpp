@@ -72,20 +72,7 @@ PointCloud photo_points(const Dataset& dataset,
     return scattered_points(photos, region, depths_around(guess), count, seed);
   }
   if (depths) return swept_points(photos, *depths, count, unsure, seed).points;
-  const DepthRange found = swept_depths(photos, guess, seed);
-  spdlog::debug(
-      "the photos show what is {:.3g} to {:.3g} away, typically {:.3g} ({:.3g} by the "
-      "cameras){}",
-      found.nearest, found.farthest, found.typical, guess,
-      found.open ? "; they leave depths open" : "");
-  PointCloud foreground;
-  if (found.open) foreground = foreground_points(photos, guess, count / 2, seed);
-  SweptPoints swept = swept_points(photos, found, count - foreground.size(), unsure, seed);
-  if (foreground.size() > 0) {
-    spdlog::debug("{} points of the start stand before what is too far to tell its depth",
-                  foreground.size());
-    for (std::size_t i = 0; i < foreground.size(); ++i) append_point(foreground, i, swept.points);
-  }
+  SweptPoints swept = searched_points(photos, guess, count, unsure, seed);
   if (checks_poses) check_poses(dataset, photos, swept.agreed, seed);
   return std::move(swept.points);
 }

@@ -440,4 +440,26 @@ PointCloud foreground_points(std::span<const SmallPhoto> photos,
   return out;
 }
 
+SweptPoints searched_points(std::span<const SmallPhoto> photos,
+                            double guess,
+                            std::size_t count,
+                            double unsure,
+                            std::uint64_t seed) {
+  const DepthRange depths = swept_depths(photos, guess, seed);
+  spdlog::debug(
+      "the photos show what is {:.3g} to {:.3g} away, typically {:.3g} ({:.3g} by the "
+      "cameras){}",
+      depths.nearest, depths.farthest, depths.typical, guess,
+      depths.open ? "; they leave depths open" : "");
+  PointCloud foreground;
+  if (depths.open) foreground = foreground_points(photos, guess, count / 2, seed);
+  SweptPoints out = swept_points(photos, depths, count - foreground.size(), unsure, seed);
+  if (foreground.size() > 0) {
+    spdlog::debug("{} points of the start stand before what is too far to tell its depth",
+                  foreground.size());
+    for (std::size_t i = 0; i < foreground.size(); ++i) append_point(foreground, i, out.points);
+  }
+  return out;
+}
+
 }  // namespace raysplats

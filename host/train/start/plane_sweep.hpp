@@ -57,4 +57,12 @@ PointCloud foreground_points(std::span<const SmallPhoto> photos,
                              std::size_t count,
                              std::uint64_t seed);
 
+/// As swept_points(), in the depths that swept_depths() finds. Where these are open, what stands
+/// before them is swept as well, for up to half of `count`.
+SweptPoints searched_points(std::span<const SmallPhoto> photos,
+                            double guess,
+                            std::size_t count,
+                            double unsure,
+                            std::uint64_t seed);
+
 }  // namespace raysplats

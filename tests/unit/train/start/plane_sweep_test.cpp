@@ -265,6 +265,14 @@ TEST_CASE("what stands before far mountains is found though most pixels tell no 
   CHECK(points.size() > 100);
   CHECK(points.size() <= 200);
   CHECK(found > points.size() * 8 / 10);
+
+  // A start has both, and together no more than it asked for.
+  const PointCloud all = searched_points(photos, 3.0, 400, 0.25, 3).points;
+  CHECK(all.size() > 390);
+  CHECK(all.size() <= 400);
+  std::size_t before = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) before += all.positions[3 * i] < depths.nearest;
+  CHECK(before == points.size());
 }
 
 TEST_CASE("cameras turned at arm's length find what is around them") {
