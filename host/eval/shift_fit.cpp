@@ -14,7 +14,8 @@ namespace raysplats {
 namespace {
 
 constexpr int kCoarsest = 48;       // pixels of the longer side from which reduced pictures end
-constexpr int kSteps = 4;           // at each size
+constexpr int kSteps = 4;           // at each size at most
+constexpr double kSettled = 0.01;   // pixels of a step after which none follows at its size
 constexpr double kLongest = 1.0;    // pixels a step, where a picture is nearly linear
 constexpr double kFarthest = 0.05;  // of the longer side
 constexpr std::size_t kRows = 16;   // a chunk of rows whose sums are added in order
@@ -148,7 +149,11 @@ ShiftFit fit_shift(const Image& image, const Image& photo, const Image& weight) 
   glm::dvec2 shift{0.0};
   for (auto size = sizes.rbegin(); size != sizes.rend(); ++size) {
     if (size != sizes.rbegin()) shift *= 2.0;
-    for (int k = 0; k < kSteps; ++k) shift += step_from(*size, shift);
+    for (int k = 0; k < kSteps; ++k) {
+      const glm::dvec2 step = step_from(*size, shift);
+      shift += step;
+      if (glm::length(step) < kSettled) break;
+    }
   }
   // Farther is no error of a pose, but a picture of something else.
   if (glm::length(shift) > kFarthest * std::max(image.width, image.height)) return {};
