@@ -80,9 +80,9 @@ std::int64_t iterations_within(double seconds,
 
 /// How far a run of a given time is when its last steps, which are alike, have been timed.
 struct SteadyPace {
-  std::int64_t iteration = 0;   ///< of the run, so far
-  double seconds = 0;           ///< spent so far
-  double seconds_of_step = 0;   ///< from here on
+  std::int64_t iteration = 0;  ///< of the run, so far
+  double seconds = 0;          ///< spent so far
+  double seconds_of_step = 0;  ///< from here on
 };
 
 /// The iteration that a run which was planned with `planned` iterations ends with, so that it

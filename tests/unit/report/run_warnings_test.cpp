@@ -3,6 +3,9 @@
 #include <doctest/doctest.h>
 #include <fmt/format.h>
 
+#include <cmath>
+#include <glm/trigonometric.hpp>
+#include <numbers>
 #include <string>
 #include <utility>
 
@@ -99,6 +102,33 @@ TEST_CASE("a run that has seen its photos a few times warns of those alone that 
   CHECK_FALSE(is_odd(20, 2999, 400));
   run.write("config.toml", "views-per-step = 2\n");
   CHECK(is_odd(20, 100));
+}
+
+TEST_CASE("a run warns of photos that contradict those from beside them where they are many") {
+  const Run run;
+  // Two walks around an object, the second of which sees it from `turned` degrees aside.
+  const auto warns = [&](double psnr, double turned, int wrong) {
+    std::string list;
+    for (int i = 0; i < 60; ++i) {
+      const bool second = i >= 30;
+      const double angle = 2 * std::numbers::pi * (i % 30) / 30;
+      const double to = angle + (second ? glm::radians(turned) : 0.0);
+      list += fmt::format(
+          R"({}{{"name":"{}.png","psnr":{},"center":[{},{},{}],"direction":[{},{},0]}})",
+          i > 0 ? "," : "", i, second && i < 30 + wrong ? psnr : 30 + i % 3, -std::cos(angle),
+          -std::sin(angle), second ? 0.5 : 0.0, std::cos(to), std::sin(to));
+    }
+    run.write("metrics.json",
+              fmt::format(R"({{"complete":true,"iteration":600,"photos":[{}]}})", list));
+    return contains(run_report(run.path()),
+                    "find the poses anew, or remove these photos and the like: 30.png, 31.png, "
+                    "32.png, ");
+  };
+  CHECK(warns(21, 0, 12));
+  CHECK_FALSE(warns(24, 0, 12));
+  // A few are no part of a capture, and who looks elsewhere contradicts nobody.
+  CHECK_FALSE(warns(21, 0, 6));
+  CHECK_FALSE(warns(21, 90, 12));
 }
 
 TEST_CASE("a run whose held-out photos fit where they are shifted names --poses") {

@@ -21,9 +21,8 @@ TEST_CASE("numbers are read in the spellings of TOML and of shells") {
   CHECK(parse_natural("1_0k") == 10000u);
   CHECK(parse_natural("18446744073709551615") == 18446744073709551615u);
   CHECK(parse_real("1_0.5") == 10.5);
-  for (const char* text :
-       {"", "1.5", "1e-1", "7x", "_1", "1__0", "nan", "1e40", "+-1", "9223372036854775808",
-        "k", "1.2345k", "0.1k1", "1kM", "1K", "1e12M"}) {
+  for (const char* text : {"", "1.5", "1e-1", "7x", "_1", "1__0", "nan", "1e40", "+-1",
+                           "9223372036854775808", "k", "1.2345k", "0.1k1", "1kM", "1K", "1e12M"}) {
     INFO(text);
     CHECK_FALSE(parse_whole(text));
   }
