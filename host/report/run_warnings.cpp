@@ -8,9 +8,11 @@
 #include <cstddef>
 #include <glm/glm.hpp>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
+#include "eval/photo_agreement.hpp"
 #include "report/run_files.hpp"
 #include "util/number_text.hpp"
 
@@ -86,29 +88,24 @@ std::optional<glm::dvec3> vector_of(const Json& photo, const char* key) {
   return out;
 }
 
-/// A photo that the model was compared with, and where it was taken.
-struct PlacedPhoto {
-  std::string name;
-  double psnr;
-  glm::dvec3 center;                    ///< 0 where nothing is known of it
-  std::optional<glm::dvec3> direction;  ///< none of panoramas
-};
-
-std::vector<PlacedPhoto> placed(const std::vector<Json>& photos) {
-  std::vector<PlacedPhoto> out;
-  for (const Json& photo : photos) {
-    if (!photo.contains("psnr")) continue;
-    out.push_back({text(photo, "name"), number(photo, "psnr"),
-                   vector_of(photo, "center").value_or(glm::dvec3(0)),
-                   vector_of(photo, "direction")});
-  }
+/// The photos that the model was compared with and that steps show to the end.
+std::vector<Json> compared(const std::vector<Json>& photos) {
+  std::vector<Json> out = photos;
+  std::erase_if(out, [](const Json& photo) {
+    return !photo.contains("psnr") || photo.contains("left_out_from");
+  });
   return out;
 }
 
-/// Whether two photos may show the same: they look less than an angle apart, or all around.
-bool look_alike(const PlacedPhoto& a, const PlacedPhoto& b, double degrees) {
-  return !a.direction || !b.direction ||
-         glm::dot(*a.direction, *b.direction) > std::cos(glm::radians(degrees));
+/// These, with their places; those that nothing is known of lie at 0.
+std::vector<PlacedPhoto> placed(const std::vector<Json>& photos) {
+  std::vector<PlacedPhoto> out;
+  out.reserve(photos.size());
+  for (const Json& photo : photos) {
+    out.push_back({number(photo, "psnr"), vector_of(photo, "center").value_or(glm::dvec3(0)),
+                   vector_of(photo, "direction")});
+  }
+  return out;
 }
 
 bool is_complete(const Json& metrics) {
@@ -242,89 +239,53 @@ std::string plain(const std::vector<Json>& photos) {
   return names_of(far_below(photos, "coarse_sharpness", octaves, kPlainOctaves));
 }
 
-/// The PSNR of the photos from the nearest places, no farther away than `farthest`, that look the
-/// same way; at most so many.
-std::vector<double> psnr_beside(const std::vector<PlacedPhoto>& photos,
-                                const PlacedPhoto& photo,
-                                double degrees,
-                                std::size_t most,
-                                double farthest = kNoBound) {
-  std::vector<std::pair<double, double>> others;  // distance, PSNR
-  for (const PlacedPhoto& other : photos) {
-    if (other.name == photo.name || !look_alike(photo, other, degrees)) continue;
-    const double distance = glm::distance(photo.center, other.center);
-    if (distance <= farthest) others.emplace_back(distance, other.psnr);
-  }
-  const std::size_t count = std::min(others.size(), most);
-  std::partial_sort(others.begin(), others.begin() + static_cast<std::ptrdiff_t>(count),
-                    others.end());
-  std::vector<double> out;
-  out.reserve(count);
-  for (std::size_t i = 0; i < count; ++i) out.push_back(others[i].second);
-  return out;
-}
-
-/// Of fewer photos each shows much that no other does.
-constexpr std::size_t kLeastPhotos = 12;
-
 /// Training photos that the model comes far less near to than to the others, and than to the two
 /// beside them: what lies at the border of a capture is learned later, all of it. The distances
 /// count so many `times`, and twice that for photos that no two look the same way as: each shows
 /// what none of the others does.
 std::string odd(const std::vector<Json>& photos, double times) {
   constexpr std::size_t kNeighbours = 2;
+  constexpr std::size_t kLeast = 12;  // of fewer photos each shows much that no other does
   constexpr double kAlone = 2.0, kDegrees = 45;
-  if (photos.size() < kLeastPhotos) return "";
-  std::vector<Json> found = far_below(photos, "psnr", itself, kOddDecibels, times);
-  const std::vector<PlacedPhoto> all = placed(photos),
-                                 farther = placed(far_below(photos, "psnr", itself, kOddDecibels,
-                                                            kAlone * times));
-  std::erase_if(found, [&](const Json& photo) {
-    const PlacedPhoto one = placed({photo}).front();
-    const std::vector<double> beside = psnr_beside(all, one, kDegrees, kNeighbours);
+  if (photos.size() < kLeast) return "";
+  const std::vector<PlacedPhoto> places = placed(photos);
+  const auto names_below = [&](double of) {
+    std::set<std::string> names;
+    for (const Json& photo : far_below(photos, "psnr", itself, kOddDecibels, of))
+      names.insert(text(photo, "name"));
+    return names;
+  };
+  const std::set<std::string> below = names_below(times), farther = names_below(kAlone * times);
+  std::vector<Json> found;
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    if (!below.contains(text(photos[i], "name"))) continue;
+    const std::vector<std::size_t> beside =
+        photos_beside(places, i, kDegrees, kNeighbours, kNoBound);
     const bool alone = beside.size() < kNeighbours;
-    const auto is_it = [&](const PlacedPhoto& other) { return other.name == one.name; };
-    if (alone && std::none_of(farther.begin(), farther.end(), is_it)) return true;
+    if (alone && !farther.contains(text(photos[i], "name"))) continue;
     const double least = (alone ? kAlone : 1.0) * times * kOddDecibels;
-    return std::any_of(beside.begin(), beside.end(),
-                       [&](double psnr) { return one.psnr > psnr - least; });
-  });
+    const auto is_near = [&](std::size_t other) {
+      return places[i].psnr > places[other].psnr - least;
+    };
+    if (std::none_of(beside.begin(), beside.end(), is_near)) found.push_back(photos[i]);
+  }
   return names_of(found);
 }
 
-/// The median distance of photos from the middle of them.
-double spread_of(const std::vector<PlacedPhoto>& photos) {
-  glm::dvec3 middle;
-  std::vector<double> values(photos.size());
-  for (int k = 0; k < 3; ++k) {
-    for (std::size_t i = 0; i < photos.size(); ++i) values[i] = photos[i].center[k];
-    middle[k] = median(values);
-  }
-  for (std::size_t i = 0; i < photos.size(); ++i)
-    values[i] = glm::distance(photos[i].center, middle);
-  return median(std::move(values));
+/// As contradicted_photos(): these are to be removed, so that many are named.
+std::string contradicted(const std::vector<Json>& photos) {
+  constexpr std::size_t kMost = 24;
+  std::vector<Json> found;
+  for (const std::size_t photo : contradicted_photos(placed(photos)))
+    found.push_back(photos[photo]);
+  return names_of(found, kMost);
 }
 
-/// Training photos that contradict others from beside them: some of the nearest that look the same
-/// way, if not the very nearest, have a far better PSNR. Where that is so of many, the capture has
-/// two parts that do not fit, as when a reconstruction takes one side of an object for another.
-/// Of a dozen sound captures and thirty rendered ones 0.05 of the photos or fewer are such.
-std::string contradicted(const std::vector<Json>& photos) {
-  constexpr std::size_t kNeighbours = 6, kBetter = 2;
-  constexpr double kDegrees = 30, kDecibels = 8, kShare = 0.1;
-  constexpr std::size_t kMost = 24;  // that are named: these are to be removed
-  const std::vector<PlacedPhoto> all = placed(photos);
-  if (all.size() < kLeastPhotos) return "";
-  const double spread = spread_of(all);
-  std::vector<Json> found;
-  for (const PlacedPhoto& photo : all) {
-    const std::vector<double> beside = psnr_beside(all, photo, kDegrees, kNeighbours, spread);
-    const auto better = std::count_if(beside.begin(), beside.end(),
-                                      [&](double psnr) { return psnr >= photo.psnr + kDecibels; });
-    if (better >= static_cast<std::ptrdiff_t>(kBetter)) found.push_back({{"name", photo.name}});
-  }
-  const double share = static_cast<double>(found.size()) / static_cast<double>(all.size());
-  return share > kShare ? names_of(found, kMost) : "";
+/// Those that the run has left out itself.
+std::string left_out(std::vector<Json> photos) {
+  constexpr std::size_t kMost = 24;
+  std::erase_if(photos, [](const Json& photo) { return !photo.contains("left_out_from"); });
+  return names_of(photos, kMost);
 }
 
 /// About views that stand out, which tells of their photos and poses more than of the model.
@@ -350,12 +311,16 @@ void warn_of_views(const std::vector<Json>& views,
   warn(
       "Training photos that the model comes far less near to than to the others; their pose or "
       "exposure may be wrong, few others show what they do, or something in them has moved: ",
-      odd(photos, settled ? 1.0 : kTimesBefore));
+      odd(compared(photos), settled ? 1.0 : kTimesBefore));
   warn(
       "Training photos that contradict others from beside them, as where a reconstruction takes "
       "one "
       "side of an object for another; find the poses anew, or remove these photos and the like: ",
-      contradicted(photos));
+      contradicted(compared(photos)));
+  warn(
+      "Training photos that were left out, because they contradict others from beside them; their "
+      "pose may be wrong, or something in them has moved: ",
+      left_out(photos));
 }
 
 }  // namespace

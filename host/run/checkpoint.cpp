@@ -102,6 +102,7 @@ nlohmann::json header_of(const Checkpoint& c) {
           {"skipped_updates", c.skipped_updates},
           {"mean_since", c.mean_since},
           {"views_joined", c.views_joined},
+          {"left_out_from", c.left_out_from},
           {"pass_due", c.pass_due},
           {"config", c.config}};
 }
@@ -144,6 +145,8 @@ Checkpoint parse_header(const std::string& text, std::uint32_t version) {
     get_whole<std::int64_t>(json, "mean_since", 0, kMaxIterations, c.mean_since);
   if (json.contains("views_joined"))
     get_whole<std::int64_t>(json, "views_joined", 0, kMaxIterations, c.views_joined);
+  if (json.contains("left_out_from"))
+    get_whole<std::int64_t>(json, "left_out_from", 0, kMaxIterations, c.left_out_from);
   if (json.contains("split")) json.at("split").get_to(c.split);
   if (json.contains("pass_due")) json.at("pass_due").get_to(c.pass_due);
   json.at("config").get_to(c.config);

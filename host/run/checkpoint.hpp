@@ -37,6 +37,9 @@ struct Checkpoint {
   /// Iterations before those that train on the views of validate-views too, as planned or past; 0
   /// without such views and in older files.
   std::int64_t views_joined = 0;
+  /// Iterations before those that do without the photos of the section "left_out"; 0 without such
+  /// photos and in older files.
+  std::int64_t left_out_from = 0;
   /// The run failed within the iteration, after its step: what follows a step, density control
   /// among it, is still to come.
   bool pass_due = false;

@@ -17,6 +17,11 @@ namespace {
 constexpr std::uint64_t kViewStream = 0x7669657773;
 constexpr std::uint64_t kBackgroundStream = 0x6261636b;
 constexpr std::uint64_t kJoinedPass = std::uint64_t{1} << 48;  // of passes over all views
+constexpr std::uint64_t kShorterPass = std::uint64_t{1}
+                                       << 50;  // of those over what is left of them
+constexpr std::array<double, 4> kJudged{0.2, 0.3, 0.4,
+                                        0.5};  // of the run: what is left out comes back
+constexpr double kJudgedVisits = 2.0;          // of each photo, before a model tells them apart
 constexpr double kValidationShare = 0.9;  // of the run; then validation views are trained on too
 constexpr int kValidations = 9;
 constexpr std::int64_t kNeverJoined = 1LL << 52;  // beyond any run; its views can be counted
@@ -253,28 +258,63 @@ std::vector<std::size_t> validation_views(std::size_t views, int count) {
   return out;
 }
 
+bool judges_photos_at(const TrainOptions& options, std::size_t photos, std::int64_t iteration) {
+  if (!options.leave_out_odd || options.poses) return false;
+  const double steps = static_cast<double>(iteration) * options.views_per_step;
+  return steps >= kJudgedVisits * static_cast<double>(photos) &&
+         std::any_of(kJudged.begin(), kJudged.end(), [&](double share) {
+           return iteration == std::llround(share * static_cast<double>(options.iterations));
+         });
+}
+
+bool judges_last_at(const TrainOptions& options, std::int64_t iteration) {
+  return iteration == std::llround(kJudged.back() * static_cast<double>(options.iterations));
+}
+
 ViewOrder::ViewOrder(std::uint64_t seed,
                      std::size_t views,
                      std::span<const std::size_t> apart,
                      std::int64_t join)
-    : seed_(seed), all_(views), join_(apart.empty() ? 0 : join) {
-  std::iota(all_.begin(), all_.end(), std::size_t{0});
-  std::set_difference(all_.begin(), all_.end(), apart.begin(), apart.end(),
-                      std::back_inserter(first_));
+    : seed_(seed) {
+  std::vector<std::size_t> all(views), first;
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  std::set_difference(all.begin(), all.end(), apart.begin(), apart.end(),
+                      std::back_inserter(first));
+  parts_.push_back({0, kViewStream, std::move(first)});
+  if (!apart.empty()) parts_.push_back({join, kViewStream + kJoinedPass, std::move(all)});
+}
+
+void ViewOrder::leave_out(std::span<const std::size_t> views, std::int64_t from) {
+  const auto shorter = [&](Part part) {
+    std::vector<std::size_t> rest;
+    std::set_difference(part.views.begin(), part.views.end(), views.begin(), views.end(),
+                        std::back_inserter(rest));
+    part.views = std::move(rest);
+    part.stream += kShorterPass;
+    return part;
+  };
+  std::vector<Part> parts;
+  for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const std::int64_t end = i + 1 < parts_.size() ? parts_[i + 1].from : kNeverJoined;
+    if (parts_[i].from < from) parts.push_back(parts_[i]);
+    if (end <= from) continue;
+    parts.push_back(shorter(parts_[i]));
+    parts.back().from = std::max(parts.back().from, from);
+  }
+  parts_ = std::move(parts);
 }
 
 std::size_t ViewOrder::at(std::int64_t iteration) {
-  const bool joined = iteration >= join_;
-  const std::vector<std::size_t>& views = joined ? all_ : first_;
-  const auto size = static_cast<std::int64_t>(views.size());
-  const std::int64_t since = joined ? iteration - join_ : iteration;
-  // Passes of both kinds are numbered apart.
-  const std::uint64_t pass =
-      2 * static_cast<std::uint64_t>(since / size) + (joined && join_ > 0 ? 1 : 0);
-  if (permutation_.size() != views.size() || pass != pass_) {
-    pass_ = pass;
-    permutation_ = views;
-    CounterRng rng(seed_, kViewStream + (pass & 1 ? kJoinedPass : 0) + pass / 2);
+  const auto after = std::find_if(parts_.begin() + 1, parts_.end(),
+                                  [&](const Part& part) { return part.from > iteration; });
+  const Part& part = *(after - 1);
+  const auto size = static_cast<std::int64_t>(part.views.size());
+  const std::int64_t since = iteration - part.from;
+  const std::uint64_t stream = part.stream + static_cast<std::uint64_t>(since / size);
+  if (permutation_.empty() || stream != stream_) {
+    stream_ = stream;
+    permutation_ = part.views;
+    CounterRng rng(seed_, stream);
     for (std::size_t i = permutation_.size(); i > 1; --i)
       std::swap(permutation_[i - 1], permutation_[rng.below(i)]);
   }

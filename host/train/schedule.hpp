@@ -117,6 +117,13 @@ constexpr std::size_t kLeastTrained = 2;
 /// `count` of `views` positions, evenly spread; fewer when that would leave less than two others.
 std::vector<std::size_t> validation_views(std::size_t views, int count);
 
+/// Whether it is judged after `iteration` completed ones which of `photos` contradict the others:
+/// at 0.1, 0.2, 0.3, 0.4 and 0.5 of a run that does not train poses, once it has shown each of them
+/// twice.
+bool judges_photos_at(const TrainOptions& options, std::size_t photos, std::int64_t iteration);
+/// Whether that is for the last time.
+bool judges_last_at(const TrainOptions& options, std::int64_t iteration);
+
 /// Order in which views are trained: a new random permutation for every pass over them.
 class ViewOrder {
  public:
@@ -126,6 +133,8 @@ class ViewOrder {
             std::size_t views,
             std::span<const std::size_t> apart = {},
             std::int64_t join = 0);
+  /// Views (ascending) that no iteration from `from` on has, where a new pass begins; once.
+  void leave_out(std::span<const std::size_t> views, std::int64_t from);
   /// Position in [0, views) of the view of an iteration.
   std::size_t at(std::int64_t iteration);
   /// The views of the iterations after the last one asked for, at most `count` and up to the end of
@@ -133,10 +142,16 @@ class ViewOrder {
   std::span<const std::size_t> upcoming(std::size_t count) const;
 
  private:
+  // Passes over the same views.
+  struct Part {
+    std::int64_t from;
+    std::uint64_t stream;  // of random numbers of its first pass
+    std::vector<std::size_t> views;
+  };
+
   std::uint64_t seed_;
-  std::vector<std::size_t> all_, first_;  // views of a pass, from `join_` on and before
-  std::int64_t join_;
-  std::uint64_t pass_ = 0;  // streams of random numbers are numbered by it
+  std::vector<Part> parts_;   // in their order
+  std::uint64_t stream_ = 0;  // of the pass that follows
   std::size_t position_ = 0;
   std::vector<std::size_t> permutation_;
 };

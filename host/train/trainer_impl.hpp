@@ -180,6 +180,13 @@ struct Trainer::Impl {
   bool out_of_patience() const;
   void keep_best_model();
 
+  // trainer_agreement.cpp: training photos that contradict each other.
+  void order_views();
+  std::vector<std::size_t> odd_views();
+  void leave_out_odd_views();
+  void store_left_out(Checkpoint& checkpoint, CheckpointSections& sections) const;
+  void restore_left_out(const Checkpoint& checkpoint);
+
   // trainer_pace.cpp: steps on their way.
   void send_step();
   void send_sampled_step();
@@ -267,6 +274,10 @@ struct Trainer::Impl {
   // Positions in train_views that stay out of the loss until join_iteration().
   std::vector<std::size_t> apart;
   std::optional<std::int64_t> joined;  // when they joined, if the run was to be shorter then
+  // Positions in train_views that contradict the others, and the iterations before those that do
+  // without them.
+  std::vector<std::size_t> left_out;
+  std::int64_t left_out_from = 0;
   DensityControl density;
   Footprint footprint;
   ParameterMean mean;

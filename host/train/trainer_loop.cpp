@@ -95,6 +95,7 @@ void Trainer::Impl::run_iterations(std::int64_t until, const Loop& loop) {
 // One step and what is said of it. Returns whether the run is to end with this iteration.
 bool Trainer::Impl::run_iteration(const Loop& loop) {
   if (ranks.size() > 1) asked.stop_wished = loop.interrupted() || asked.stop;
+  if (judges_photos_at(options, loss_views(), iteration)) leave_out_odd_views();
   send_sampled_step();
   if (fit_end_to_time()) {
     loop.progress.set_total(last_iteration(options));

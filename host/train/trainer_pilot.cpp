@@ -87,8 +87,7 @@ void Trainer::Impl::apply_options() {
   TrainOptions centred = options;
   centred.bounds = about_origin(options.bounds, dataset.origin);
   density.follow(centred, loss_views());
-  order =
-      ViewOrder(options.seed, train_views.size(), apart, join_iteration() * options.views_per_step);
+  order_views();
 }
 
 double Trainer::Impl::predicted_seconds(const Pilot& pilot,

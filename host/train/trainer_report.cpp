@@ -53,8 +53,12 @@ nlohmann::json Trainer::Impl::photo_report() const {
         photo["direction"] = {direction.x, direction.y, direction.z};
       }
     }
+    const bool is_left_out = std::binary_search(left_out.begin(), left_out.end(), i);
+    if (is_left_out) photo["name"] = train_cameras[i].name;  // which this part may not have read
     if (photo.is_null()) continue;
     if (std::isfinite(psnr[i])) photo["psnr"] = std::min(psnr[i], kMostPsnr);
+    photo.erase("left_out_from");
+    if (is_left_out) photo["left_out_from"] = left_out_from;
     out.push_back(std::move(photo));
   }
   return out;

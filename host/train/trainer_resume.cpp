@@ -81,6 +81,7 @@ void Trainer::Impl::write_state(const std::filesystem::path& path) {
   }
   if (exposure) add("exposure", exposure->deltas());
   add("motion", {motion});
+  store_left_out(checkpoint, sections);
   write_checkpoint(path, checkpoint, sections);
 }
 
@@ -332,6 +333,7 @@ void Trainer::Impl::restore_from(const std::filesystem::path& source) {
   if (!checkpoint.config.empty()) resumed = parse_train_config(checkpoint.config);
   if (continues) check_newer_models(checkpoint.iteration);
   restore_joined_views(checkpoint);
+  restore_left_out(checkpoint);
   restore_state(context, checkpoint, options, gaussians, adam, density);
   restore_mean(checkpoint, options, gaussians, mean);
   restore_parts(checkpoint);

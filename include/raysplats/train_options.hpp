@@ -89,6 +89,10 @@ struct TrainOptions {
   /// How the data set was read, as a run says for its evaluation; a resumed one has to have the
   /// same. Trainer takes it from what load_dataset() gave.
   DatasetOptions data;
+  /// From 0.1 of the run on photos that contradict those from beside them are not trained on
+  /// (photos_to_leave_out() of host/eval); not with `poses`, which may mend what is wrong with
+  /// them.
+  bool leave_out_odd = true;
   int validate_views = 0;  ///< training views kept out of the loss, by which the run is judged
   int patience = 0;        ///< validations in a row without gain that end the run; 0 = off
   /// "auto" (white behind cut-out photos, else the photos' typical colour), "random", "sky" or

@@ -3,6 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <glm/mat4x4.hpp>
+#include <glm/matrix.hpp>
+#include <glm/vec4.hpp>
+
 #include "raysplats/error.hpp"
 #include "scene/image/pixel_count.hpp"
 
@@ -94,6 +100,31 @@ void Exposure::step(std::size_t view,
                 static_cast<std::uint32_t>(slot), static_cast<std::uint32_t>(views_),
                 static_cast<std::uint32_t>(members), static_cast<std::uint32_t>(view),
                 static_cast<float>(damping));
+}
+
+double Exposure::removable_error(std::size_t slot) const {
+  constexpr double kLeastVariance = 1e-6;  // of colours that tell two numbers of the fit apart
+  const std::vector<float> all = sums_.download();
+  const float* sums = all.data() + kSums * slot;
+  const auto weight = static_cast<double>(sums[22]);
+  if (!(weight > 0)) return 0;
+  glm::dmat4 moments(kLeastVariance);
+  int next = 0;
+  for (int a = 0; a < 4; ++a) {
+    for (int b = a; b < 4; ++b) {
+      const double moment = static_cast<double>(sums[next++]) / weight;
+      moments[a][b] += moment;
+      if (a != b) moments[b][a] += moment;
+    }
+  }
+  const glm::dmat4 inverse = glm::inverse(moments);
+  double out = 0;
+  for (int c = 0; c < 3; ++c) {
+    glm::dvec4 errors;
+    for (int a = 0; a < 4; ++a) errors[a] = static_cast<double>(sums[10 + 4 * c + a]) / weight;
+    out += glm::dot(errors, inverse * errors) / 3.0;
+  }
+  return std::isfinite(out) ? std::max(out, 0.0) : 0.0;
 }
 
 void Exposure::restore(const std::vector<float>& deltas) {

@@ -68,6 +68,10 @@ class Exposure {
             const Buffer<std::uint32_t>& guard,
             bool joined = true);
 
+  /// What an affine colour would take off the mean squared error of a picture at most, by what
+  /// observe() has kept of it in `slot`: of R, G and B, over what counts. Blocks.
+  double removable_error(std::size_t slot = 0) const;
+
   /// The differences of all photos, 12 numbers each. Blocks.
   std::vector<float> deltas() const { return deltas_.download(); }
   /// Throws DataError when they are not of as many photos.

@@ -131,6 +131,21 @@ TEST_CASE("a run warns of photos that contradict those from beside them where th
   CHECK_FALSE(warns(21, 90, 12));
 }
 
+TEST_CASE("a run names the photos that it left out, which are no odd ones of its end") {
+  const Run run;
+  std::string list;
+  for (int i = 0; i < 20; ++i) {
+    list += fmt::format(R"({}{{"name":"{}.png","psnr":{}{}}})", i > 0 ? "," : "", i,
+                        i == 3 ? 12 : 25 + i % 5, i == 3 ? R"(,"left_out_from":300)" : "");
+  }
+  run.write("metrics.json",
+            fmt::format(R"({{"complete":true,"iteration":600,"photos":[{}]}})", list));
+  const std::string page = run_report(run.path());
+  CHECK(contains(page, "Training photos that were left out, because they contradict others"));
+  CHECK(contains(page, "or something in them has moved: 3.png."));
+  CHECK(!contains(page, "comes far less near to"));
+}
+
 TEST_CASE("a run whose held-out photos fit where they are shifted names --poses") {
   const Run run;
   const auto names_poses = [&](double gain, int iteration, const std::string& poses,

@@ -34,6 +34,7 @@ Checkpoint sample(std::int64_t iteration) {
   c.bad_steps_in_a_row = 2;
   c.skipped_updates = 11;
   c.views_joined = 6300;
+  c.left_out_from = 3500;
   c.pass_due = true;
   c.config = "iterations = 5\n# \"quoted\"\n";
   c.sections["means"] = {1.5f, -0.0f, std::numeric_limits<float>::denorm_min(), std::nanf("7")};
@@ -65,6 +66,7 @@ TEST_CASE("a checkpoint comes back bit for bit") {
   CHECK(read.bad_steps_in_a_row == 2);
   CHECK(read.skipped_updates == 11);
   CHECK(read.views_joined == 6300);
+  CHECK(read.left_out_from == 3500);
   CHECK(read.pass_due);
   CHECK(read.config == c.config);
   REQUIRE(read.sections.size() == 3);

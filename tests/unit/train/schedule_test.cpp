@@ -250,6 +250,54 @@ TEST_CASE("every pass sees every view once, in another order, and a new object c
   CHECK(seeded != first);
 }
 
+TEST_CASE("photos are judged up to half of a run, once it has seen them twice") {
+  TrainOptions options;
+  options.iterations = 1000;
+  CHECK(judges_photos_at(options, 100, 500));
+  CHECK(judges_photos_at(options, 100, 200));
+  CHECK(judges_last_at(options, 500));
+  CHECK_FALSE(judges_last_at(options, 400));
+  CHECK_FALSE(judges_photos_at(options, 100, 499));
+  CHECK_FALSE(judges_photos_at(options, 126, 200));
+  CHECK(judges_photos_at(options, 126, 300));
+  CHECK_FALSE(judges_photos_at(options, 251, 500));
+  options.views_per_step = 2;
+  CHECK(judges_photos_at(options, 251, 500));
+  options.poses = true;  // may mend them
+  CHECK_FALSE(judges_photos_at(options, 100, 500));
+  options.poses = options.leave_out_odd = false;
+  CHECK_FALSE(judges_photos_at(options, 100, 500));
+}
+
+TEST_CASE("passes go on without views that are left out, from another iteration on") {
+  const std::vector<std::size_t> odd{3, 4, 8}, apart{2, 7};
+  for (const bool validates : {false, true}) {
+    ViewOrder order = validates ? ViewOrder(1, 10, apart, 60) : ViewOrder(1, 10);
+    const ViewOrder before = order;
+    order.leave_out(odd, 33);
+    ViewOrder plain = before;
+    for (int i = 0; i < 33; ++i) CHECK(order.at(i) == plain.at(i));
+    const int views = validates ? 5 : 7;
+    std::multiset<std::size_t> seen, late;
+    for (int i = 33; i < 33 + 4 * views; ++i) seen.insert(order.at(i));
+    CHECK(seen.size() == static_cast<std::size_t>(4 * views));
+    for (std::size_t view = 0; view < 10; ++view) {
+      const bool shown =
+          view != 3 && view != 4 && view != 8 && !(validates && (view == 2 || view == 7));
+      CHECK(seen.count(view) == (shown ? 4 : 0));
+    }
+    const int begin = validates ? 60 : 61;  // of a pass
+    for (int i = begin; i < begin + 14; ++i) late.insert(order.at(i));
+    CHECK(late.count(3) + late.count(4) + late.count(8) == 0);
+    CHECK(late.count(7) == 2);
+    // Asked for out of turn, and by a new object that begins there.
+    ViewOrder resumed = validates ? ViewOrder(1, 10, apart, 60) : ViewOrder(1, 10);
+    resumed.leave_out(odd, 33);
+    CHECK(resumed.at(70) == order.at(70));
+    CHECK(resumed.at(5) == plain.at(5));
+  }
+}
+
 TEST_CASE("validation views are evenly spread and come into the order late") {
   CHECK(validation_views(10, 2) == std::vector<std::size_t>{2, 7});
   CHECK(validation_views(10, 0).empty());
