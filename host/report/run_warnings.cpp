@@ -166,13 +166,16 @@ std::optional<double> usual_gain(const std::vector<Json>& views, const char* key
 double gained_by_colors(const std::vector<Json>& views,
                         const Json& metrics,
                         const Settings& settings) {
-  constexpr double kNear = 22;     // dB; fitted colours bring any photo near to a model that fails
+  // Fitted colours bring any photo near to a model that fails: dB, and how near where they bring
+  // much, as they do where lamps flicker.
+  constexpr double kNear = 22, kRatherNear = 20.5, kMuch = 3;
   constexpr double kSeen = 0.025;  // root of the mean square; less is nothing of a dark scene
   if (!tells_without("exposure", metrics, settings)) return 0;
   const Json last = objects(metrics, "evaluations").back();
   const double plain = number(last, "psnr"), fitted = number(last, "psnr_corrected");
   const double square = std::pow(10.0, -plain / 10.0) - std::pow(10.0, -fitted / 10.0);
-  if (fitted < kNear || square <= kSeen * kSeen) return 0;
+  const double near = fitted - plain >= kMuch ? kRatherNear : kNear;
+  if (fitted < near || square <= kSeen * kSeen) return 0;
   return usual_gain(views, "psnr_corrected").value_or(fitted - plain);
 }
 

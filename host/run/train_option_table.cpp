@@ -184,7 +184,7 @@ void add_data_options(TrainTable& t, TrainOptions& o) {
   t.flag("leave-out-odd", o.leave_out_odd,
          "from 0.1 of the run on leave out training photos that contradict those from beside "
          "them, as by a wrong pose, a folded reconstruction or a finger before the lens (not with "
-         "poses, nor before two steps for each photo)");
+         "poses, nor in runs of less than six steps for each photo)");
   t.number(
       "validate-views", o.validate_views, 0, 1e6,
       "training views that are kept out of the loss until 0.9 of the run, with poses to its end, "

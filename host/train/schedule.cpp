@@ -19,9 +19,6 @@ constexpr std::uint64_t kBackgroundStream = 0x6261636b;
 constexpr std::uint64_t kJoinedPass = std::uint64_t{1} << 48;  // of passes over all views
 constexpr std::uint64_t kShorterPass = std::uint64_t{1}
                                        << 50;  // of those over what is left of them
-constexpr std::array<double, 4> kJudged{0.2, 0.3, 0.4,
-                                        0.5};  // of the run: what is left out comes back
-constexpr double kJudgedVisits = 2.0;          // of each photo, before a model tells them apart
 constexpr double kValidationShare = 0.9;  // of the run; then validation views are trained on too
 constexpr int kValidations = 9;
 constexpr std::int64_t kNeverJoined = 1LL << 52;  // beyond any run; its views can be counted
@@ -258,17 +255,24 @@ std::vector<std::size_t> validation_views(std::size_t views, int count) {
   return out;
 }
 
-bool judges_photos_at(const TrainOptions& options, std::size_t photos, std::int64_t iteration) {
-  if (!options.leave_out_odd || options.poses) return false;
-  const double steps = static_cast<double>(iteration) * options.views_per_step;
-  return steps >= kJudgedVisits * static_cast<double>(photos) &&
-         std::any_of(kJudged.begin(), kJudged.end(), [&](double share) {
-           return iteration == std::llround(share * static_cast<double>(options.iterations));
-         });
+std::span<const double> judged_shares(const TrainOptions& options, std::size_t photos) {
+  static constexpr std::array<double, 5> kOften{0.1, 0.2, 0.3, 0.4, 0.5};
+  static constexpr std::array<double, 2> kTwice{0.2, 0.4};
+  static constexpr std::array<double, 1> kOnce{0.3};
+  if (!options.leave_out_odd || options.poses || photos == 0) return {};
+  const double visits = static_cast<double>(options.iterations) * options.views_per_step /
+                        static_cast<double>(photos);
+  if (visits >= 60) return kOften;
+  if (visits >= 15) return kTwice;
+  if (visits >= 6) return kOnce;
+  return {};
 }
 
-bool judges_last_at(const TrainOptions& options, std::int64_t iteration) {
-  return iteration == std::llround(kJudged.back() * static_cast<double>(options.iterations));
+bool judges_photos_at(const TrainOptions& options, std::size_t photos, std::int64_t iteration) {
+  const std::span<const double> shares = judged_shares(options, photos);
+  return std::any_of(shares.begin(), shares.end(), [&](double share) {
+    return iteration == std::llround(share * static_cast<double>(options.iterations));
+  });
 }
 
 ViewOrder::ViewOrder(std::uint64_t seed,

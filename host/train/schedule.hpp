@@ -117,12 +117,12 @@ constexpr std::size_t kLeastTrained = 2;
 /// `count` of `views` positions, evenly spread; fewer when that would leave less than two others.
 std::vector<std::size_t> validation_views(std::size_t views, int count);
 
-/// Whether it is judged after `iteration` completed ones which of `photos` contradict the others:
-/// at 0.1, 0.2, 0.3, 0.4 and 0.5 of a run that does not train poses, once it has shown each of them
-/// twice.
+/// When it is judged which of `photos` contradict the others: shares of the run, ascending. A
+/// comparison costs a third of a step for each photo, so that a run has more of them the more often
+/// it shows each photo; none below six times, and none where poses are trained.
+std::span<const double> judged_shares(const TrainOptions& options, std::size_t photos);
+/// Whether that is after `iteration` completed ones.
 bool judges_photos_at(const TrainOptions& options, std::size_t photos, std::int64_t iteration);
-/// Whether that is for the last time.
-bool judges_last_at(const TrainOptions& options, std::int64_t iteration);
 
 /// Order in which views are trained: a new random permutation for every pass over them.
 class ViewOrder {

@@ -47,7 +47,7 @@ std::vector<std::size_t> Trainer::Impl::odd_views() {
     const int divisor = (std::max(full.width, full.height) + kSide - 1) / kSide;
     const Camera camera = divisor > 1 ? downscaled(full, divisor) : full;
     const int width = camera.width, height = camera.height;
-    tracer.forward(gaussians, camera, true, ViewSizes::kAwaited);
+    tracer.forward(gaussians, camera, false, ViewSizes::kAwaited);
     const Buffer<float>& shown =
         exposure ? exposure->apply(tracer.image(), view, background, width, height)
                  : tracer.image();
@@ -82,7 +82,9 @@ void Trainer::Impl::leave_out_odd_views() {
     left_out_from = left_out.empty() ? 0 : iteration;
     order_views();
   }
-  if (left_out.empty() || !ranks.leads() || !judges_last_at(options, iteration)) return;
+  const double last = judged_shares(options, loss_views()).back();
+  const bool more = iteration < std::llround(last * static_cast<double>(options.iterations));
+  if (left_out.empty() || more || !ranks.leads()) return;
   std::vector<std::string> names;
   for (const std::size_t view : left_out) {
     if (names.size() == kNamed) break;
@@ -107,11 +109,13 @@ void Trainer::Impl::restore_left_out(const Checkpoint& checkpoint) {
   left_out_from = 0;
   const auto found = checkpoint.sections.find("left_out");
   if (found != checkpoint.sections.end() && options.leave_out_odd) {
-    for (const float view : found->second) left_out.push_back(static_cast<std::size_t>(view));
-    if (!std::is_sorted(left_out.begin(), left_out.end()) ||
-        (!left_out.empty() && left_out.back() >= train_views.size())) {
-      throw DataError(
-          "The checkpoint leaves out photos that its run does not have: resume from another one");
+    for (const float view : found->second) {
+      const double least = left_out.empty() ? 0 : static_cast<double>(left_out.back()) + 1;
+      if (!(view >= least && view < static_cast<double>(train_views.size()))) {
+        throw DataError(
+            "The checkpoint leaves out photos that its run does not have: resume from another one");
+      }
+      left_out.push_back(static_cast<std::size_t>(view));
     }
     left_out_from = checkpoint.left_out_from;
   }

@@ -250,23 +250,27 @@ TEST_CASE("every pass sees every view once, in another order, and a new object c
   CHECK(seeded != first);
 }
 
-TEST_CASE("photos are judged up to half of a run, once it has seen them twice") {
+TEST_CASE("photos are judged the more often the more steps a run has for each") {
   TrainOptions options;
-  options.iterations = 1000;
-  CHECK(judges_photos_at(options, 100, 500));
-  CHECK(judges_photos_at(options, 100, 200));
-  CHECK(judges_last_at(options, 500));
-  CHECK_FALSE(judges_last_at(options, 400));
-  CHECK_FALSE(judges_photos_at(options, 100, 499));
-  CHECK_FALSE(judges_photos_at(options, 126, 200));
-  CHECK(judges_photos_at(options, 126, 300));
-  CHECK_FALSE(judges_photos_at(options, 251, 500));
+  options.iterations = 600;
+  const auto judged = [&](std::size_t photos) {
+    std::vector<std::int64_t> out;
+    for (std::int64_t i = 0; i <= options.iterations; ++i) {
+      if (judges_photos_at(options, photos, i)) out.push_back(i);
+    }
+    return out;
+  };
+  using Iterations = std::vector<std::int64_t>;
+  CHECK(judged(10) == Iterations{60, 120, 180, 240, 300});
+  CHECK(judged(11) == Iterations{120, 240});
+  CHECK(judged(41) == Iterations{180});
+  CHECK(judged(101).empty());
   options.views_per_step = 2;
-  CHECK(judges_photos_at(options, 251, 500));
+  CHECK(judged(101) == Iterations{180});
   options.poses = true;  // may mend them
-  CHECK_FALSE(judges_photos_at(options, 100, 500));
+  CHECK(judged(10).empty());
   options.poses = options.leave_out_odd = false;
-  CHECK_FALSE(judges_photos_at(options, 100, 500));
+  CHECK(judged(10).empty());
 }
 
 TEST_CASE("passes go on without views that are left out, from another iteration on") {
