@@ -243,7 +243,8 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
   if (const auto best = better_before(run.evaluations(), options.exposure)) {
     spdlog::warn(
         "the last PSNR of the test views, {:.2f} dB, is below that of iteration {}, {:.2f} dB: the "
-        "run learns its photos by heart or its rates are too high",
+        "run learns its photos by heart, its rates are too high, or something moves in the photos, "
+        "which masks can leave out",
         judged_psnr(run.evaluations().back(), options.exposure), best->iteration,
         judged_psnr(*best, options.exposure));
   }
