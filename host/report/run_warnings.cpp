@@ -317,8 +317,7 @@ void warn_of_views(const std::vector<Json>& views,
       odd(compared(photos), settled ? 1.0 : kTimesBefore));
   warn(
       "Training photos that contradict others from beside them, as where a reconstruction takes "
-      "one "
-      "side of an object for another; find the poses anew, or remove these photos and the like: ",
+      "one side of an object for another; find the poses anew, or remove these and the like: ",
       contradicted(compared(photos)));
   warn(
       "Training photos that were left out, because they contradict others from beside them; their "

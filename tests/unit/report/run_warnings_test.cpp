@@ -121,7 +121,7 @@ TEST_CASE("a run warns of photos that contradict those from beside them where th
     run.write("metrics.json",
               fmt::format(R"({{"complete":true,"iteration":600,"photos":[{}]}})", list));
     return contains(run_report(run.path()),
-                    "find the poses anew, or remove these photos and the like: 30.png, 31.png, "
+                    "find the poses anew, or remove these and the like: 30.png, 31.png, "
                     "32.png, ");
   };
   CHECK(warns(21, 0, 12));
