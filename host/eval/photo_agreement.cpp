@@ -16,8 +16,9 @@ constexpr std::size_t kLeastPhotos = 12;
 constexpr std::size_t kNeighbours = 6;
 constexpr double kDegrees = 30;
 constexpr double kDecibels = 8;
-constexpr std::size_t kSomeBetter = 2;  // of the neighbours, of a photo that contradicts them
-constexpr std::size_t kMostBetter = 4;  // of one that stands alone
+constexpr double kRelativeDecibels = 6;  // of the error relative to the photo's contrast
+constexpr std::size_t kSomeBetter = 2;   // of the neighbours, of a photo that contradicts them
+constexpr std::size_t kMostBetter = 4;   // of one that stands alone
 constexpr double kFoldedShare = 0.1;
 constexpr double kFoldedRest = 0.03;  // of those that do not stand alone
 constexpr double kMostShare = 0.6;    // of photos that a model is better without
@@ -43,7 +44,9 @@ std::vector<std::size_t> better_beside(std::span<const PlacedPhoto> photos) {
   for (std::size_t i = 0; i < photos.size(); ++i) {
     const std::vector<std::size_t> beside = photos_beside(photos, i, kDegrees, kNeighbours, spread);
     const auto is_better = [&](std::size_t other) {
-      return photos[other].psnr >= photos[i].psnr + kDecibels;
+      const double nearer = photos[other].psnr - photos[i].psnr;
+      return nearer >= kDecibels &&
+             nearer + photos[other].contrast - photos[i].contrast >= kRelativeDecibels;
     };
     out[i] = static_cast<std::size_t>(std::count_if(beside.begin(), beside.end(), is_better));
   }

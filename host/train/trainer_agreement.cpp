@@ -23,6 +23,7 @@ namespace {
 constexpr int kSide = 96;
 // Of the error of a picture, what no fit of its colours takes off.
 constexpr double kLeastError = 0.01;
+constexpr double kLeastVariance = 1e-8;  // of the colours of a photo
 constexpr std::size_t kNamed = 8;
 
 }  // namespace
@@ -57,7 +58,11 @@ std::vector<std::size_t> Trainer::Impl::odd_views() {
     const double error = std::pow(10.0, -loss.value().psnr / 10.0);
     if (!std::isfinite(error) || !(error > 0)) continue;  // nothing of it counts, or it is equal
     const double left = std::max(error - colors.removable_error(), kLeastError * error);
-    PlacedPhoto placed{-10.0 * std::log10(left), full.center(), std::nullopt};
+    const double variance = std::max(colors.photo_variance(error), kLeastVariance);
+    PlacedPhoto placed;
+    placed.psnr = -10.0 * std::log10(left);
+    placed.contrast = 10.0 * std::log10(variance);
+    placed.center = full.center();
     if (full.model != CameraModel::kEquirectangular) placed.direction = view_axis(full);
     photos.push_back(placed);
     views.push_back(view);

@@ -127,6 +127,21 @@ double Exposure::removable_error(std::size_t slot) const {
   return std::isfinite(out) ? std::max(out, 0.0) : 0.0;
 }
 
+double Exposure::photo_variance(double error, std::size_t slot) const {
+  constexpr std::array<std::size_t, 3> kSquare{0, 4, 7}, kMean{3, 6, 8};  // of R, G and B
+  const std::vector<float> all = sums_.download();
+  const auto sum = [&](std::size_t j) { return static_cast<double>(all[kSums * slot + j]); };
+  const double weight = sum(22);
+  if (!(weight > 0)) return 0;
+  // The photo is the picture and what it differs by.
+  double out = error;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double mean = (sum(kMean[c]) + sum(10 + 4 * c + 3)) / weight;
+    out += ((sum(kSquare[c]) + 2 * sum(10 + 4 * c + c)) / weight - mean * mean) / 3;
+  }
+  return std::max(out, 0.0);
+}
+
 void Exposure::restore(const std::vector<float>& deltas) {
   if (deltas.size() != kNumbers * views_) {
     throw DataError(

@@ -71,6 +71,9 @@ class Exposure {
   /// What an affine colour would take off the mean squared error of a picture at most, by what
   /// observe() has kept of it in `slot`: of R, G and B, over what counts. Blocks.
   double removable_error(std::size_t slot = 0) const;
+  /// The variance of the photo's colours, the mean of R, G and B, by the same and the mean squared
+  /// error of the picture. Blocks.
+  double photo_variance(double error, std::size_t slot = 0) const;
 
   /// The differences of all photos, 12 numbers each. Blocks.
   std::vector<float> deltas() const { return deltas_.download(); }

@@ -94,6 +94,18 @@ TEST_CASE("of a folded capture one side is left out as a whole") {
   CHECK(photos_to_leave_out(photos).empty());
 }
 
+TEST_CASE(
+    "dark photos beside bright ones contradict nothing, though they are nearer to the model") {
+  std::vector<PlacedPhoto> photos = walks(30);
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    photos[i].contrast = i % 2 == 0 ? -12 : -21;
+    if (i % 2 != 0) photos[i].psnr += 9;
+  }
+  CHECK(photos_to_leave_out(photos).empty());
+  photos[10].psnr = 15;
+  CHECK(photos_to_leave_out(photos) == Positions{10});
+}
+
 TEST_CASE("many photos that stand alone are no fold: what they spoil beside them is kept") {
   std::vector<PlacedPhoto> photos = walks(30);
   Positions wrong;

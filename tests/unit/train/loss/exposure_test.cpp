@@ -253,6 +253,17 @@ TEST_CASE("exposure: what colours take off an error is what is affine of it [sma
     exposure.observe(image, {words, 4, false}, {0, 0, 0}, kWidth, kHeight, 1);
     // Of twelve numbers for 851 pixels noise is fitted a little.
     CHECK(exposure.removable_error(1) == doctest::Approx(error - rest).epsilon(0.001 + 3 * rest));
+    double variance = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      double mean = 0, square = 0;
+      for (std::size_t i = 0; i < kPixels; ++i) {
+        const double y = photo.numbers[c * kPixels + i];
+        mean += y / kPixels;
+        square += y * y / kPixels;
+      }
+      variance += (square - mean * mean) / 3;
+    }
+    CHECK(exposure.photo_variance(error, 1) == doctest::Approx(variance).epsilon(1e-4));
   }
 }
 
