@@ -29,11 +29,10 @@ std::vector<std::size_t> photos_beside(std::span<const PlacedPhoto> photos,
 /// Photos that contradict others from beside them, where these are more than a tenth of all:
 /// positions, ascending. Of the six nearest that look the same way (less than 30 degrees apart, no
 /// farther away than the photos' median distance from their middle) two or more have a PSNR that is
-/// 8 dB better, and 6 dB where the contrast of both is added: a dark photo is nearer to anything. A
-/// capture has two parts then that do not fit, as when a reconstruction takes one
-/// side of an object for another. Of a dozen sound captures and thirty rendered ones 0.05 of the
-/// photos or fewer are such. None of fewer than 12 photos, of which each shows what no other does.
-/// O(N^2).
+/// 8 dB better, and 6 dB where the contrast of both is added: a dark photo is nearer to anything.
+/// A capture has two parts then that do not fit, as when a reconstruction takes one side of an
+/// object for another. Of a dozen sound captures and thirty rendered ones 0.05 of the photos or
+/// fewer are such. None of fewer than 12 photos, of which each shows what no other does. O(N^2).
 std::vector<std::size_t> contradicted_photos(std::span<const PlacedPhoto> photos);
 
 /// Photos that a model is better without: positions, ascending. Those of which four of the six

@@ -57,11 +57,11 @@ std::vector<std::size_t> Trainer::Impl::odd_views() {
     colors.observe(shown, photo, background, width, height);
     const double error = std::pow(10.0, -loss.value().psnr / 10.0);
     if (!std::isfinite(error) || !(error > 0)) continue;  // nothing of it counts, or it is equal
-    const double left = std::max(error - colors.removable_error(), kLeastError * error);
-    const double variance = std::max(colors.photo_variance(error), kLeastVariance);
+    const Exposure::Tale tale = colors.tale(error);
+    const double left = std::max(error - tale.removable, kLeastError * error);
     PlacedPhoto placed;
     placed.psnr = -10.0 * std::log10(left);
-    placed.contrast = 10.0 * std::log10(variance);
+    placed.contrast = 10.0 * std::log10(std::max(tale.variance, kLeastVariance));
     placed.center = full.center();
     if (full.model != CameraModel::kEquirectangular) placed.direction = view_axis(full);
     photos.push_back(placed);

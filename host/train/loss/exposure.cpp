@@ -102,44 +102,31 @@ void Exposure::step(std::size_t view,
                 static_cast<float>(damping));
 }
 
-double Exposure::removable_error(std::size_t slot) const {
+Exposure::Tale Exposure::tale(double error, std::size_t slot) const {
   constexpr double kLeastVariance = 1e-6;  // of colours that tell two numbers of the fit apart
   const std::vector<float> all = sums_.download();
-  const float* sums = all.data() + kSums * slot;
-  const auto weight = static_cast<double>(sums[22]);
-  if (!(weight > 0)) return 0;
-  glm::dmat4 moments(kLeastVariance);
+  const auto sum = [&](int j) {
+    return static_cast<double>(all[kSums * slot + static_cast<std::size_t>(j)]);
+  };
+  const double weight = sum(22);
+  if (!(weight > 0)) return {};
+  glm::dmat4 moments(0.0);
   int next = 0;
   for (int a = 0; a < 4; ++a) {
-    for (int b = a; b < 4; ++b) {
-      const double moment = static_cast<double>(sums[next++]) / weight;
-      moments[a][b] += moment;
-      if (a != b) moments[b][a] += moment;
-    }
+    for (int b = a; b < 4; ++b) moments[a][b] = moments[b][a] = sum(next++) / weight;
   }
-  const glm::dmat4 inverse = glm::inverse(moments);
-  double out = 0;
+  const glm::dmat4 inverse = glm::inverse(moments + glm::dmat4(kLeastVariance));
+  Tale out{0, error};
   for (int c = 0; c < 3; ++c) {
     glm::dvec4 errors;
-    for (int a = 0; a < 4; ++a) errors[a] = static_cast<double>(sums[10 + 4 * c + a]) / weight;
-    out += glm::dot(errors, inverse * errors) / 3.0;
+    for (int a = 0; a < 4; ++a) errors[a] = sum(10 + 4 * c + a) / weight;
+    out.removable += glm::dot(errors, inverse * errors) / 3;
+    // The photo is the picture and what it differs by.
+    const double mean = moments[c][3] + errors[3];
+    out.variance += (moments[c][c] + 2 * errors[c] - mean * mean) / 3;
   }
-  return std::isfinite(out) ? std::max(out, 0.0) : 0.0;
-}
-
-double Exposure::photo_variance(double error, std::size_t slot) const {
-  constexpr std::array<std::size_t, 3> kSquare{0, 4, 7}, kMean{3, 6, 8};  // of R, G and B
-  const std::vector<float> all = sums_.download();
-  const auto sum = [&](std::size_t j) { return static_cast<double>(all[kSums * slot + j]); };
-  const double weight = sum(22);
-  if (!(weight > 0)) return 0;
-  // The photo is the picture and what it differs by.
-  double out = error;
-  for (std::size_t c = 0; c < 3; ++c) {
-    const double mean = (sum(kMean[c]) + sum(10 + 4 * c + 3)) / weight;
-    out += ((sum(kSquare[c]) + 2 * sum(10 + 4 * c + c)) / weight - mean * mean) / 3;
-  }
-  return std::max(out, 0.0);
+  if (!std::isfinite(out.removable) || !std::isfinite(out.variance)) return {};
+  return {std::max(out.removable, 0.0), std::max(out.variance, 0.0)};
 }
 
 void Exposure::restore(const std::vector<float>& deltas) {

@@ -68,12 +68,13 @@ class Exposure {
             const Buffer<std::uint32_t>& guard,
             bool joined = true);
 
-  /// What an affine colour would take off the mean squared error of a picture at most, by what
-  /// observe() has kept of it in `slot`: of R, G and B, over what counts. Blocks.
-  double removable_error(std::size_t slot = 0) const;
-  /// The variance of the photo's colours, the mean of R, G and B, by the same and the mean squared
-  /// error of the picture. Blocks.
-  double photo_variance(double error, std::size_t slot = 0) const;
+  /// What the sums of a picture and its photo tell of them, means of R, G and B over what counts.
+  struct Tale {
+    double removable = 0;  ///< what an affine colour takes off the mean squared error at most
+    double variance = 0;   ///< of the photo's colours; where photos are cut out, of its light
+  };
+  /// By what observe() has kept in `slot`, and the mean squared error of the picture. Blocks.
+  Tale tale(double error, std::size_t slot = 0) const;
 
   /// The differences of all photos, 12 numbers each. Blocks.
   std::vector<float> deltas() const { return deltas_.download(); }

@@ -252,7 +252,8 @@ TEST_CASE("exposure: what colours take off an error is what is affine of it [sma
     Exposure exposure(shared_test_context(), 1, 2);
     exposure.observe(image, {words, 4, false}, {0, 0, 0}, kWidth, kHeight, 1);
     // Of twelve numbers for 851 pixels noise is fitted a little.
-    CHECK(exposure.removable_error(1) == doctest::Approx(error - rest).epsilon(0.001 + 3 * rest));
+    const Exposure::Tale tale = exposure.tale(error, 1);
+    CHECK(tale.removable == doctest::Approx(error - rest).epsilon(0.001 + 3 * rest));
     double variance = 0;
     for (std::size_t c = 0; c < 3; ++c) {
       double mean = 0, square = 0;
@@ -263,7 +264,7 @@ TEST_CASE("exposure: what colours take off an error is what is affine of it [sma
       }
       variance += (square - mean * mean) / 3;
     }
-    CHECK(exposure.photo_variance(error, 1) == doctest::Approx(variance).epsilon(1e-4));
+    CHECK(tale.variance == doctest::Approx(variance).epsilon(1e-4));
   }
 }
 
