@@ -5,6 +5,10 @@
 // reduce_photo: one work-item per target pixel. photo, out: as train/photo.h says, out with 4
 // planes; `weighted`: both have a plane of weights. Pixels without any coverage are 0.
 // Complexity: source pixels.
+//
+// mask_photo: the same photo without what `mask` (PixelMask of mask_width x mask_height, any size)
+// marks, which counts for nothing: its alpha is 0, or with `weights` its weight, in a plane that
+// follows. One work-item per pixel.
 #define LANES 1
 #include "train/photo.h"
 
@@ -67,4 +71,34 @@ __kernel void reduce_photo(const __global uint* photo,
   out[2 * out_pixels + target] = as_uint(color.z);
   out[3 * out_pixels + target] = as_uint(counted > 0.0f ? min(sum.w / counted, 1.0f) : 0.0f);
   if (weighted) out[4 * out_pixels + target] = as_uint(counted / ((float)width * (float)height));
+}
+
+__kernel void mask_photo(const __global uint* photo,
+                         const __global uint* mask,
+                         __global uint* out,
+                         int planes,
+                         int weighted,
+                         int weights,
+                         int width,
+                         int height,
+                         int mask_width,
+                         int mask_height) {
+  const int at = get_global_id(0);
+  const int pixels = width * height;
+  if (at >= pixels) return;
+  const int x = at % width * mask_width / width;
+  const int y = at / width * mask_height / height;
+  const int bit = y * mask_width + x;
+  const bool counts = (mask[bit / 32] >> (bit % 32) & 1u) == 0;
+  for (int plane = 0; plane < planes; ++plane) {
+    uint word = photo[plane * pixels + at];
+    // The plane of alpha, which is the upper bits of the last one where it is not alone.
+    if (!weights && !counts && plane == planes - 1)
+      word = planes == 4 ? 0 : word & (planes == 1 ? 0xffffffu : 0xffffu);
+    out[plane * pixels + at] = word;
+  }
+  if (!weights) return;
+  const uint whole = planes == 4 ? as_uint(1.0f) : 255u;
+  const uint weight = weighted ? photo[planes * pixels + at] : whole;
+  out[planes * pixels + at] = counts ? weight : 0;
 }

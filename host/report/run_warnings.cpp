@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstddef>
 #include <glm/glm.hpp>
@@ -291,6 +292,20 @@ std::string left_out(std::vector<Json> photos) {
   return names_of(photos, kMost);
 }
 
+/// What the run has warned of before its first step.
+std::vector<std::string> told_of_capture(const Json& metrics) {
+  std::vector<std::string> out;
+  const auto list = metrics.find("capture_warnings");
+  if (list == metrics.end() || !list->is_array()) return out;
+  for (const Json& each : *list) {
+    if (!each.is_string() || each.get_ref<const std::string&>().empty()) continue;
+    out.push_back(each.get<std::string>());
+    char& first = out.back().front();
+    first = static_cast<char>(std::toupper(static_cast<unsigned char>(first)));
+  }
+  return out;
+}
+
 /// About views that stand out, which tells of their photos and poses more than of the model.
 void warn_of_views(const std::vector<Json>& views,
                    const Json& metrics,
@@ -362,6 +377,7 @@ std::vector<std::string> warnings_of(const Json& metrics,
         trained ? fmt::format("The run is not over, though all {:.0f} iterations are done", all)
                 : fmt::format("The run is not over: {:.0f} of {:.0f} iterations", done, all));
   }
+  for (std::string& warning : told_of_capture(metrics)) out.push_back(std::move(warning));
   const double rays = number(metrics, "traced_rays");
   const double capped = number(metrics, "capped_rays");
   if (capped > kCappedShare * rays) {
@@ -391,7 +407,8 @@ std::vector<std::string> warnings_of(const Json& metrics,
   if (const double gain = gained_by_colors(views, metrics, settings); gain > kColorsDecibels) {
     out.push_back(fmt::format(
         "Held-out photos are {:.1f} dB nearer to the model once their colours are fitted, as where "
-        "exposure or white balance changes between photos: try --exposure",
+        "exposure or white balance changes between photos: try --exposure, and "
+        "judge it by psnr_corrected",
         gain));
   }
   if (const double gain = gained_by_shift(views, metrics, settings); gain > kShiftDecibels) {

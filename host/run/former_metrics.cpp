@@ -40,15 +40,19 @@ std::vector<Json> named(const Json& of, const char* key) {
   return out;
 }
 
+std::vector<std::string> texts(const Json& of, const char* key) {
+  std::vector<std::string> out;
+  const auto list = of.find(key);
+  if (list == of.end() || !list->is_array()) return out;
+  for (const Json& each : *list) {
+    if (each.is_string()) out.push_back(each.get<std::string>());
+  }
+  return out;
+}
+
 // The commands that the run had, the one that started it first.
 Json commands_of(const Json& of) {
-  Json out = Json::array();
-  const auto list = of.find("commands");
-  if (list != of.end() && list->is_array()) {
-    for (const Json& each : *list) {
-      if (each.is_string()) out.push_back(each);
-    }
-  }
+  Json out = texts(of, "commands");
   if (out.empty()) out.push_back(of.at("command"));
   return out;
 }
@@ -89,6 +93,10 @@ Json all_kernels(const Json& now, const Json& former) {
 double former_number(const Json& former, const char* key) {
   const auto found = former.find(key);
   return found != former.end() && found->is_number() ? found->get<double>() : 0.0;
+}
+
+std::vector<std::string> former_warnings(const Json& former) {
+  return texts(former, "capture_warnings");
 }
 
 std::map<std::string, Json> former_photos(const Json& former) {

@@ -4,6 +4,7 @@
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 namespace raysplats {
 
@@ -19,6 +20,9 @@ nlohmann::json continued_metrics(nlohmann::json now, const nlohmann::json& forme
 
 /// The facts about each training photo, by its name.
 std::map<std::string, nlohmann::json> former_photos(const nlohmann::json& former);
+
+/// What a run has warned of in its capture.
+std::vector<std::string> former_warnings(const nlohmann::json& former);
 
 /// A number of it; 0 where it is unknown.
 double former_number(const nlohmann::json& former, const char* key);

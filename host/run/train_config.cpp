@@ -394,6 +394,11 @@ void validate(const TrainOptions& options) {
         "The option 'depth-weight' cannot be used with 'mirrors': what is seen in them has no "
         "single depth");
   }
+  if (options.leave_out_moving && !options.mirrors.empty()) {
+    throw UsageError(
+        "The option 'leave-out-moving' cannot be used with 'mirrors': what is seen in them has no "
+        "place that other photos could tell of; leave one of them out");
+  }
   if (options.background == "sky" && !options.mirrors.empty()) {
     throw UsageError(
         "The option 'background' = sky cannot be used with 'mirrors', which show one colour "

@@ -185,6 +185,14 @@ void add_data_options(TrainTable& t, TrainOptions& o) {
          "from 0.1 of the run on leave out training photos that contradict those from beside "
          "them, as by a wrong pose, a folded reconstruction or a finger before the lens (not with "
          "poses, nor in runs of less than six steps for each photo)");
+  t.flag(
+      "leave-out-moving", o.leave_out_moving,
+      "from 0.2 of the run on leave out what moves or changes from photo to photo, as people and "
+      "cars: what a photo shows and the model does not, though others that see the place agree "
+      "with it (not with mirrors)");
+  t.flag("even-places", o.even_places,
+         "draw photos from one place, as where a video stands still, no more often than four times "
+         "as many as most places have");
   t.number(
       "validate-views", o.validate_views, 0, 1e6,
       "training views that are kept out of the loss until 0.9 of the run, with poses to its end, "

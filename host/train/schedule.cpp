@@ -255,55 +255,111 @@ std::vector<std::size_t> validation_views(std::size_t views, int count) {
   return out;
 }
 
+namespace {
+
+// Of ascending numbers.
+std::vector<std::size_t> without(std::span<const std::size_t> all,
+                                 std::span<const std::size_t> some) {
+  std::vector<std::size_t> out;
+  std::set_difference(all.begin(), all.end(), some.begin(), some.end(), std::back_inserter(out));
+  return out;
+}
+
+std::vector<std::size_t> in_both(std::span<const std::size_t> a, std::span<const std::size_t> b) {
+  std::vector<std::size_t> out;
+  std::set_intersection(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(out));
+  return out;
+}
+
+// Steps of a run for each of its photos.
+double visits(const TrainOptions& options, std::size_t photos) {
+  return static_cast<double>(options.iterations) * options.views_per_step /
+         std::max(1.0, static_cast<double>(photos));
+}
+
+bool is_at(std::span<const double> shares, std::int64_t iterations, std::int64_t iteration) {
+  return std::any_of(shares.begin(), shares.end(), [&](double share) {
+    return iteration == std::llround(share * static_cast<double>(iterations));
+  });
+}
+
+}  // namespace
+
 std::span<const double> judged_shares(const TrainOptions& options, std::size_t photos) {
   static constexpr std::array<double, 5> kOften{0.1, 0.2, 0.3, 0.4, 0.5};
   static constexpr std::array<double, 2> kTwice{0.2, 0.4};
   static constexpr std::array<double, 1> kOnce{0.3};
   if (!options.leave_out_odd || options.poses || photos == 0) return {};
-  const double visits = static_cast<double>(options.iterations) * options.views_per_step /
-                        static_cast<double>(photos);
-  if (visits >= 60) return kOften;
-  if (visits >= 15) return kTwice;
-  if (visits >= 6) return kOnce;
+  const double each = visits(options, photos);
+  if (each >= 60) return kOften;
+  if (each >= 15) return kTwice;
+  if (each >= 6) return kOnce;
   return {};
 }
 
 bool judges_photos_at(const TrainOptions& options, std::size_t photos, std::int64_t iteration) {
-  const std::span<const double> shares = judged_shares(options, photos);
-  return std::any_of(shares.begin(), shares.end(), [&](double share) {
-    return iteration == std::llround(share * static_cast<double>(options.iterations));
-  });
+  return is_at(judged_shares(options, photos), options.iterations, iteration);
+}
+
+std::span<const double> moving_shares(const TrainOptions& options, std::size_t photos) {
+  static constexpr std::array<double, 4> kOften{0.2, 0.3, 0.4, 0.5};
+  static constexpr std::array<double, 2> kTwice{0.2, 0.4};
+  if (!options.leave_out_moving || photos == 0) return {};
+  return visits(options, photos) >= 15 ? std::span<const double>(kOften) : kTwice;
+}
+
+bool looks_for_motion_at(const TrainOptions& options, std::size_t photos, std::int64_t iteration) {
+  return is_at(moving_shares(options, photos), options.iterations, iteration);
 }
 
 ViewOrder::ViewOrder(std::uint64_t seed,
                      std::size_t views,
                      std::span<const std::size_t> apart,
-                     std::int64_t join)
-    : seed_(seed) {
-  std::vector<std::size_t> all(views), first;
+                     std::int64_t join,
+                     CrowdedPlaces crowded)
+    : seed_(seed), crowded_(std::move(crowded)) {
+  std::vector<std::size_t> all(views);
   std::iota(all.begin(), all.end(), std::size_t{0});
-  std::set_difference(all.begin(), all.end(), apart.begin(), apart.end(),
-                      std::back_inserter(first));
-  parts_.push_back({0, kViewStream, std::move(first)});
-  if (!apart.empty()) parts_.push_back({join, kViewStream + kJoinedPass, std::move(all)});
+  parts_.push_back(part_of(0, kViewStream, without(all, apart)));
+  if (!apart.empty()) parts_.push_back(part_of(join, kViewStream + kJoinedPass, std::move(all)));
+}
+
+ViewOrder::Part ViewOrder::part_of(std::int64_t from,
+                                   std::uint64_t stream,
+                                   std::vector<std::size_t> views) const {
+  Part out{from, stream, std::move(views), 0};
+  out.size = out.views.size();
+  for (const std::vector<std::size_t>& place : crowded_.places) {
+    const std::size_t here = in_both(out.views, place).size();
+    out.size -= here - std::min(here, crowded_.most);
+  }
+  return out;
+}
+
+// The views of a pass, ascending.
+std::vector<std::size_t> ViewOrder::drawn(const Part& part, CounterRng& rng) const {
+  std::vector<std::size_t> out = part.views;
+  for (const std::vector<std::size_t>& place : crowded_.places) {
+    std::vector<std::size_t> spare = in_both(part.views, place);
+    for (std::size_t i = 0; i < std::min(crowded_.most, spare.size()); ++i)
+      std::swap(spare[i], spare[i + rng.below(spare.size() - i)]);
+    spare.erase(spare.begin(),
+                spare.begin() + static_cast<std::ptrdiff_t>(std::min(crowded_.most, spare.size())));
+    std::sort(spare.begin(), spare.end());
+    out = without(out, spare);
+  }
+  return out;
 }
 
 void ViewOrder::leave_out(std::span<const std::size_t> views, std::int64_t from) {
-  const auto shorter = [&](Part part) {
-    std::vector<std::size_t> rest;
-    std::set_difference(part.views.begin(), part.views.end(), views.begin(), views.end(),
-                        std::back_inserter(rest));
-    part.views = std::move(rest);
-    part.stream += kShorterPass;
-    return part;
-  };
   std::vector<Part> parts;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
+    const Part& part = parts_[i];
     const std::int64_t end = i + 1 < parts_.size() ? parts_[i + 1].from : kNeverJoined;
-    if (parts_[i].from < from) parts.push_back(parts_[i]);
+    if (part.from < from) parts.push_back(part);
     if (end <= from) continue;
-    parts.push_back(shorter(parts_[i]));
-    parts.back().from = std::max(parts.back().from, from);
+    parts.push_back(
+        part_of(std::max(part.from, from), part.stream + kShorterPass, without(part.views, views)));
   }
   parts_ = std::move(parts);
 }
@@ -312,13 +368,13 @@ std::size_t ViewOrder::at(std::int64_t iteration) {
   const auto after = std::find_if(parts_.begin() + 1, parts_.end(),
                                   [&](const Part& part) { return part.from > iteration; });
   const Part& part = *(after - 1);
-  const auto size = static_cast<std::int64_t>(part.views.size());
+  const auto size = static_cast<std::int64_t>(part.size);
   const std::int64_t since = iteration - part.from;
   const std::uint64_t stream = part.stream + static_cast<std::uint64_t>(since / size);
   if (permutation_.empty() || stream != stream_) {
     stream_ = stream;
-    permutation_ = part.views;
     CounterRng rng(seed_, stream);
+    permutation_ = drawn(part, rng);
     for (std::size_t i = permutation_.size(); i > 1; --i)
       std::swap(permutation_[i - 1], permutation_[rng.below(i)]);
   }

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "raysplats/train_options.hpp"
+#include "train/crowded_places.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats {
 
@@ -124,15 +126,24 @@ std::span<const double> judged_shares(const TrainOptions& options, std::size_t p
 /// Whether that is after `iteration` completed ones.
 bool judges_photos_at(const TrainOptions& options, std::size_t photos, std::int64_t iteration);
 
+/// When it is looked for what moves in the photos, with the option: shares of the run, ascending.
+/// Not before 0.2: what a model lacks that it would have learned until then is not to be taken for
+/// something that moves.
+std::span<const double> moving_shares(const TrainOptions& options, std::size_t photos);
+/// Whether that is after `iteration` completed ones.
+bool looks_for_motion_at(const TrainOptions& options, std::size_t photos, std::int64_t iteration);
+
 /// Order in which views are trained: a new random permutation for every pass over them.
 class ViewOrder {
  public:
   /// Of all positions in [0, views); those in `apart` (ascending) come in from iteration `join` on
-  /// only, where a new pass begins.
+  /// only, where a new pass begins. Of a crowded place every pass has as many as it is worth,
+  /// others each time.
   ViewOrder(std::uint64_t seed,
             std::size_t views,
             std::span<const std::size_t> apart = {},
-            std::int64_t join = 0);
+            std::int64_t join = 0,
+            CrowdedPlaces crowded = {});
   /// Views (ascending) that no iteration from `from` on has, where a new pass begins; once.
   void leave_out(std::span<const std::size_t> views, std::int64_t from);
   /// Position in [0, views) of the view of an iteration.
@@ -147,9 +158,14 @@ class ViewOrder {
     std::int64_t from;
     std::uint64_t stream;  // of random numbers of its first pass
     std::vector<std::size_t> views;
+    std::size_t size;  // of a pass: fewer where places are crowded
   };
 
+  Part part_of(std::int64_t from, std::uint64_t stream, std::vector<std::size_t> views) const;
+  std::vector<std::size_t> drawn(const Part& part, CounterRng& rng) const;
+
   std::uint64_t seed_;
+  CrowdedPlaces crowded_;
   std::vector<Part> parts_;   // in their order
   std::uint64_t stream_ = 0;  // of the pass that follows
   std::size_t position_ = 0;

@@ -128,6 +128,11 @@ Trainer::Impl::Impl(Context& device,
            {static_cast<float>(options.ssim_weight), static_cast<float>(options.alpha_weight)}),
       adam(device, adam_options_of(options)),
       apart(validation_views(train_views.size(), options.validate_views)),
+      crowded(options.even_places
+                  ? crowded_places(train_cameras,
+                                   subject_distances(train_cameras, dataset.points, extent))
+                  : CrowdedPlaces()),
+      moving(train_views.size()),
       density(device, options, extent, loss_views()),
       footprint(device,
                 train_cameras,

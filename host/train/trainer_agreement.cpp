@@ -29,8 +29,8 @@ constexpr std::size_t kNamed = 8;
 }  // namespace
 
 void Trainer::Impl::order_views() {
-  order =
-      ViewOrder(options.seed, train_views.size(), apart, join_iteration() * options.views_per_step);
+  order = ViewOrder(options.seed, train_views.size(), apart,
+                    join_iteration() * options.views_per_step, crowded);
   if (!left_out.empty()) order.leave_out(left_out, left_out_from * options.views_per_step);
 }
 

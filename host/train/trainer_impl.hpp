@@ -26,6 +26,7 @@
 #include "raysplats/trainer.hpp"
 #include "run/checkpoint.hpp"
 #include "run/run_folder.hpp"
+#include "scene/image/pixel_mask.hpp"
 #include "train/busy_trainer.hpp"
 #include "train/density/density_control.hpp"
 #include "train/density/mcmc.hpp"
@@ -126,6 +127,7 @@ struct Trainer::Impl {
   MemoryDemand demand(std::size_t count) const;
   void check_room(std::size_t count, std::size_t most) const;
   void choose_background();
+  void warn(std::string of_capture);
   void warn_of_photos();
   void choose_color_range();
   void reset_exposure();
@@ -186,6 +188,13 @@ struct Trainer::Impl {
   void leave_out_odd_views();
   void store_left_out(Checkpoint& checkpoint, CheckpointSections& sections) const;
   void restore_left_out(const Checkpoint& checkpoint);
+
+  // trainer_moving.cpp: what moves or changes from photo to photo.
+  std::vector<PixelMask> moving_views();
+  void set_moving(std::vector<PixelMask> found);
+  void leave_out_moving_areas();
+  void store_moving(CheckpointSections& sections) const;
+  void restore_moving(const Checkpoint& checkpoint);
 
   // trainer_pace.cpp: steps on their way.
   void send_step();
@@ -274,10 +283,12 @@ struct Trainer::Impl {
   // Positions in train_views that stay out of the loss until join_iteration().
   std::vector<std::size_t> apart;
   std::optional<std::int64_t> joined;  // when they joined, if the run was to be shorter then
+  CrowdedPlaces crowded;               // by positions in train_views
   // Positions in train_views that contradict the others, and the iterations before those that do
   // without them.
   std::vector<std::size_t> left_out;
   std::int64_t left_out_from = 0;
+  std::vector<PixelMask> moving;  // of all train_views, what is left out of their photos
   DensityControl density;
   Footprint footprint;
   ParameterMean mean;
@@ -319,6 +330,7 @@ struct Trainer::Impl {
   std::int64_t timed_steps = 0;                  // whose kernels were timed
   std::uint64_t skipped_before = 0;              // updates of Adam, before resume()
   std::optional<TrainOptions> resumed;           // options of the run that resume() has brought
+  std::vector<std::string> capture_warnings;     // that the run has given
   std::shared_ptr<const nlohmann::json> former;  // metrics.json before this object's first start()
   PsnrRise rise;
   RunClock clock{Stopwatch(context), Stopwatch(context)};

@@ -96,6 +96,7 @@ void Trainer::Impl::run_iterations(std::int64_t until, const Loop& loop) {
 bool Trainer::Impl::run_iteration(const Loop& loop) {
   if (ranks.size() > 1) asked.stop_wished = loop.interrupted() || asked.stop;
   if (judges_photos_at(options, loss_views(), iteration)) leave_out_odd_views();
+  if (looks_for_motion_at(options, loss_views(), iteration)) leave_out_moving_areas();
   send_sampled_step();
   if (fit_end_to_time()) {
     loop.progress.set_total(last_iteration(options));
@@ -244,7 +245,7 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
     spdlog::warn(
         "the last PSNR of the test views, {:.2f} dB, is below that of iteration {}, {:.2f} dB: the "
         "run learns its photos by heart, its rates are too high, or something moves in the photos, "
-        "which masks can leave out",
+        "which masks and --leave-out-moving can leave out",
         judged_psnr(run.evaluations().back(), options.exposure), best->iteration,
         judged_psnr(*best, options.exposure));
   }

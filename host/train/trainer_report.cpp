@@ -59,6 +59,8 @@ nlohmann::json Trainer::Impl::photo_report() const {
     if (std::isfinite(psnr[i])) photo["psnr"] = std::min(psnr[i], kMostPsnr);
     photo.erase("left_out_from");
     if (is_left_out) photo["left_out_from"] = left_out_from;
+    photo.erase("moving");
+    if (const double share = marked_share(moving[i]); share > 0) photo["moving"] = share;
     out.push_back(std::move(photo));
   }
   return out;
@@ -273,6 +275,7 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"peak_device_bytes", context.peak_allocated_bytes()},
                      {"device", device.name},
                      {"driver", fmt::format("{}, {}", device.platform, device.driver_version)},
+                     {"capture_warnings", capture_warnings},
                      {"photos", photo_report()},
                      {"timed_steps", timed_steps},
                      {"kernels", kernels_of(context)}};

@@ -82,6 +82,7 @@ void Trainer::Impl::write_state(const std::filesystem::path& path) {
   if (exposure) add("exposure", exposure->deltas());
   add("motion", {motion});
   store_left_out(checkpoint, sections);
+  store_moving(sections);
   write_checkpoint(path, checkpoint, sections);
 }
 
@@ -334,6 +335,7 @@ void Trainer::Impl::restore_from(const std::filesystem::path& source) {
   if (continues) check_newer_models(checkpoint.iteration);
   restore_joined_views(checkpoint);
   restore_left_out(checkpoint);
+  restore_moving(checkpoint);
   restore_state(context, checkpoint, options, gaussians, adam, density);
   restore_mean(checkpoint, options, gaussians, mean);
   restore_parts(checkpoint);

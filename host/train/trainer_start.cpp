@@ -15,10 +15,9 @@
 #include "scene/image/pixel_count.hpp"
 #include "scene/morton_order.hpp"
 #include "train/memory_estimate.hpp"
+#include "train/start/capture_warnings.hpp"
 #include "train/start/flat_start.hpp"
-#include "train/start/grey_photos.hpp"
 #include "train/start/mask_check.hpp"
-#include "train/start/still_ground.hpp"
 #include "train/start/still_marks.hpp"
 #include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
@@ -37,140 +36,12 @@ constexpr double kSigmoidExtent = 20;    // then one unit is less than 0.05 exte
 constexpr double kPosePrior = 1;         // PoseRefinement: what errors of half a degree can bear
 constexpr std::size_t kSomePhotos = 24;  // that tell what is typical of all
 constexpr std::size_t kManyPhotos = 100;  // that tell of depth
-constexpr std::size_t kNamed = 3;         // photos that a warning is about
 constexpr double kLeastShown = 0.01;      // of the photos, for a start to be without a reason
 
 std::vector<std::size_t> evenly_spread(const std::vector<std::size_t>& all, std::size_t most) {
   std::vector<std::size_t> out = even_choice(all.size(), most);
   for (std::size_t& i : out) i = all[i];
   return out;
-}
-
-// Warns of cameras far from all others; as a rule their poses are wrong.
-void warn_of_strays(std::span<const Camera> cameras) {
-  const std::vector<std::size_t> strays = stray_cameras(cameras);
-  if (strays.empty()) return;
-  spdlog::warn(
-      "{} of {} training views were taken far from all others, {} among them: learning rates and "
-      "sizes leave them out; where their poses are wrong, take the photos out of the data set",
-      strays.size(), cameras.size(), cameras[strays.front()].name);
-}
-
-// Pictures of a rig are named frame by frame: where the number of its lenses is a multiple of the
-// step, counting holds out the same lenses of every frame.
-void warn_of_one_direction(const Dataset& dataset,
-                           std::span<const Camera> held_out,
-                           std::span<const Camera> trained) {
-  if (dataset.test_every == 0 || !look_elsewhere(held_out, trained)) return;
-  const auto no_better = [&](std::size_t every) {
-    std::vector<Camera> multiples, others;
-    for (std::size_t i = 0; i < dataset.views.size(); ++i)
-      (i % every == 0 ? multiples : others).push_back(dataset.views[i].camera);
-    return look_elsewhere(multiples, others);
-  };
-  // Ends at the latest where less than three views are held out.
-  auto better = static_cast<std::size_t>(dataset.test_every) + 1;
-  while (no_better(better)) ++better;
-  spdlog::warn(
-      "most of the {} held-out photos look where no training photo does (is one in {} always of "
-      "the same lens of a rig?): the model lacks what they show, and metrics judge it there alone; "
-      "--test-every {} holds out photos of other lenses as well",
-      held_out.size(), dataset.test_every, better);
-}
-
-// `read`: of so many photos of the run.
-void warn_of_grey_photos(std::span<const SmallPhoto> read, std::size_t all) {
-  const std::vector<std::size_t> grey = grey_photos(read);
-  if (grey.empty()) return;
-  std::string names;
-  for (const std::size_t i : even_choice(grey.size(), kNamed))
-    names += (names.empty() ? "" : ", ") + read[grey[i]].camera.name;
-  spdlog::warn(
-      "{} of {} {} photos have no colour where others show some, {} among them: grey is learned "
-      "from these, so give them with their colours or take them out of the data set",
-      grey.size(), read.size(), all > read.size() ? "looked-at" : "training", names);
-}
-
-void warn_of_inverted_masks(const Dataset& dataset, const MaskedOut& masked) {
-  if (masked.photos == 0) return;
-  spdlog::debug(
-      "masks leave out {:.1f} % of {} places of sparse points, {:.1f} % of the pixels, {:.1f} % of "
-      "the edges, and photos agree on {:.1f} % of what they keep",
-      100 * masked.points, masked.seen, 100 * masked.pixels, 100 * masked.edge,
-      100 * masked.agreed);
-  if (!masked.inverted()) return;
-  const bool told = masked.points > 0;
-  const auto has_mask = [](const View& view) { return !view.mask_path.empty(); };
-  const auto first = std::find_if(dataset.views.begin(), dataset.views.end(), has_mask);
-  spdlog::warn(
-      "the masks, {} among them, seem to be inverted: they leave out {:.0f} % of {}; give masks "
-      "that "
-      "are black where photos are to be left out",
-      first->mask_path.string(), 100 * (told ? masked.points : masked.pixels),
-      told ? "the places where photos show sparse points"
-           : "the photos, and what they keep lies elsewhere in each");
-}
-
-// Photos of the size at which marks are looked for, however small the run has them.
-std::vector<SmallPhoto> photos_for_marks(const Dataset& dataset,
-                                         std::span<const std::size_t> views,
-                                         const ReadingProgress& progress) {
-  Dataset chosen;
-  std::vector<std::size_t> all;
-  for (const std::size_t i : views) {
-    View view = dataset.views[i];
-    const Camera& source = view.source_camera;
-    const int side = std::max(view.camera.width, view.camera.height);
-    const int most = std::min(kMarkSide, std::max(source.width, source.height));
-    if (side < most) view.camera = downscaled(view.camera, static_cast<double>(side) / most);
-    all.push_back(all.size());
-    chosen.views.push_back(std::move(view));
-  }
-  return load_small_photos(chosen, all, kMarkSide, progress);
-}
-
-// What to do about marks of the photo of a view.
-std::string without_marks(const Dataset& dataset,
-                          std::span<const StillMark> marks,
-                          const SmallPhoto& photo,
-                          const View& view) {
-  if (dataset.alpha_is_background) return "leave it out by masks that are black there";
-  std::vector<PhotoArea> areas = view.ignored;
-  for (const StillMark& mark : marks)
-    areas.push_back(area_of(mark, photo.camera, view.source_camera));
-  return fmt::format("leave it out by --ignore-areas '{}'", io::text_of(areas));
-}
-
-// `views`: of which the photos are.
-void warn_of_marks(const Dataset& dataset,
-                   std::span<const SmallPhoto> read,
-                   std::span<const std::size_t> views) {
-  if (const auto ground = still_ground(read)) {
-    spdlog::warn(
-        "{:.0f} % of the edges in photos stand at the same pixels of {} of {} of them, though by "
-        "their poses the cameras moved: what stands behind a turntable, or goes along with the "
-        "camera, is learned as haze; leave it out by masks that are black there, or by "
-        "--ignore-areas",
-        100 * ground->edges, ground->photos, read.size());
-    return;
-  }
-  const std::vector<StillMark> marks = still_marks(read);
-  if (marks.empty()) return;
-  const StillMark& mark = marks.front();
-  const auto photo = std::find_if(read.begin(), read.end(), [&](const SmallPhoto& each) {
-    return glm::ivec2(each.picture->width, each.picture->height) == mark.size;
-  });
-  const View& view = dataset.views[views[static_cast<std::size_t>(photo - read.begin())]];
-  const glm::dvec2 size(mark.size);
-  const glm::dvec2 low = 100.0 * glm::dvec2(mark.low) / size;
-  const glm::dvec2 high = 100.0 * glm::dvec2(mark.high + 1) / size;
-  spdlog::warn(
-      "something stands at the same pixels of all photos, as a logo, a date or what does not turn "
-      "with a turntable: {}from {:.0f} to {:.0f} % of their width and from {:.0f} to {:.0f} % of "
-      "their height (from the top left); it is learned as a part of the scene, so crop it off, or "
-      "{}",
-      marks.size() > 1 ? fmt::format("in {} places, the clearest ", marks.size()) : "", low.x,
-      high.x, low.y, high.y, without_marks(dataset, marks, *photo, view));
 }
 
 // A length is the user's to choose, and that of a run by time nobody knows beforehand.
@@ -376,16 +247,22 @@ void Trainer::Impl::require_depth_gradients() const {
 }
 
 // What photos that were read for the start tell of faults of the capture: as many as there are.
+void Trainer::Impl::warn(std::string of_capture) {
+  if (of_capture.empty()) return;
+  spdlog::warn("{}", of_capture);
+  capture_warnings.push_back(std::move(of_capture));
+}
+
 void Trainer::Impl::warn_of_photos() {
   if (small_photos.empty()) photos(PhotoChoice::kSome);
   const auto& [count, read] = *small_photos.rbegin();
   const std::vector<std::size_t> all = first_views();
   const std::vector<std::size_t> views = evenly_spread(all, count);
-  warn_of_grey_photos(read, all.size());
+  warn(grey_warning(read, all.size()));
   const std::vector<std::size_t> marked = evenly_spread(all, kMarkPhotos);
-  warn_of_marks(dataset, photos_for_marks(dataset, marked, {shows_progress ? stderr : nullptr}),
-                marked);
-  warn_of_inverted_masks(dataset, masked_out(dataset, read, views, options.seed));
+  warn(marks_warning(
+      dataset, photos_for_marks(dataset, marked, {shows_progress ? stderr : nullptr}), marked));
+  warn(masks_warning(dataset, masked_out(dataset, read, views, options.seed)));
 }
 
 // A model to start from, with at most that many Gaussians. Points in random places need no photo
@@ -435,6 +312,10 @@ void Trainer::Impl::load_former_metrics() {
   if (former) return;
   former = run.former_metrics();
   clock.evaluating.set(former_number(*former, "evaluation_seconds"));
+  for (std::string& warning : former_warnings(*former)) {
+    if (std::ranges::find(capture_warnings, warning) == capture_warnings.end())
+      capture_warnings.push_back(std::move(warning));
+  }
   const TrainOptions& before = resumed ? *resumed : options;
   for (const TrainRow& row : run.former_rows()) {
     last_loss = row.loss;
@@ -458,12 +339,15 @@ void Trainer::Impl::start() {
     if (ranks.leads()) warn_of_photos();
   }
   small_photos.clear();
-  warn_of_strays(train_cameras);
+  warn(strays_warning(train_cameras));
   if (train_views.size() < kFewViews) {
     spdlog::warn("{} of {}: depth is open, and other views will look wrong",
                  counted(train_views.size(), "training view"), dataset.root.string());
   }
-  warn_of_one_direction(dataset, cameras_of(dataset, test_views), train_cameras);
+  const std::vector<Camera> held_out = cameras_of(dataset, test_views);
+  warn(direction_warning(dataset, held_out, train_cameras));
+  warn(crowds_warning(crowded, train_cameras,
+                      subject_distances(train_cameras, dataset.points, extent), held_out));
   note_many_passes(options, train_views.size());
   note_unseen(options, train_views.size(), order);
   warn_of_late("eval-at", options.eval_at, options);

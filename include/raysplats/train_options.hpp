@@ -93,6 +93,12 @@ struct TrainOptions {
   /// (photos_to_leave_out() of host/eval); not with `poses`, which may mend what is wrong with
   /// them.
   bool leave_out_odd = true;
+  /// From 0.2 of the run on what a photo shows and others do not, where they see that place, is not
+  /// trained on (moving_areas() of host/eval); not with mirrors.
+  bool leave_out_moving = false;
+  /// Of photos from one place no more are drawn in a pass than four times as many as most places
+  /// have (crowded_places() of host/train).
+  bool even_places = true;
   int validate_views = 0;  ///< training views kept out of the loss, by which the run is judged
   int patience = 0;        ///< validations in a row without gain that end the run; 0 = off
   /// "auto" (white behind cut-out photos, else the photos' typical colour), "random", "sky" or

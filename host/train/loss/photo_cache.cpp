@@ -64,6 +64,30 @@ const PhotoCache::Entry& PhotoCache::full_size(std::size_t view) {
 }
 
 DevicePhoto PhotoCache::get(std::size_t view, int width, int height) {
+  const DevicePhoto whole = get_whole(view, width, height);
+  if (left_out_.empty() || left_out_[view].width == 0) return whole;
+  const LeftOut& out = left_out_[view];
+  const DevicePhoto rest{masked_, whole.planes, whole.weighted || cut_out_};
+  const std::size_t pixels = pixel_count(width, height);
+  masked_.ensure(context_, rest.words_of(pixels), "photo without what moves");
+  if (!mask_) mask_ = context_.kernel("train/photo_cache.cl", "mask_photo");
+  mask_.launch(Range::linear(pixels, kGroup), whole.words, out.words, masked_, whole.planes,
+               whole.weighted ? 1 : 0, rest.weighted ? 1 : 0, width, height, out.width, out.height);
+  return rest;
+}
+
+void PhotoCache::leave_out(std::size_t view, const PixelMask& mask, bool cut_out) {
+  left_out_.resize(entries_.size());
+  cut_out_ = cut_out;
+  LeftOut& out = left_out_[view];
+  out.width = mask.width;
+  out.height = mask.height;
+  if (mask.width == 0) return;
+  out.words.ensure(context_, mask.words.size(), "what moves in a photo");
+  out.words.upload(mask.words);
+}
+
+DevicePhoto PhotoCache::get_whole(std::size_t view, int width, int height) {
   const Entry& entry = full_size(view);
   const DevicePhoto whole{entry.words, entry.planes, entry.weighted};
   if (entry.width == width && entry.height == height) return whole;

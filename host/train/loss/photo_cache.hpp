@@ -14,6 +14,7 @@
 #include "device/upload_queue.hpp"
 #include "io/photo/view_loader.hpp"
 #include "raysplats/dataset.hpp"
+#include "scene/image/pixel_mask.hpp"
 #include "train/loss/device_photo.hpp"
 
 namespace raysplats {
@@ -33,8 +34,14 @@ class PhotoCache {
              std::size_t ahead);
 
   /// The photo of a view (an index into `views`) reduced to width x height (area average), until
-  /// the next call. Waits for the file, not for the device.
+  /// the next call, without what leave_out() has marked. Waits for the file, not for the device.
   DevicePhoto get(std::size_t view, int width, int height);
+  /// The same with what is marked.
+  DevicePhoto get_whole(std::size_t view, int width, int height);
+
+  /// From now on what `mask` marks, of any size, counts for nothing in the photo of a view; a mask
+  /// of no size takes that back. `cut_out`: the photos' alpha is coverage, not how much they count.
+  void leave_out(std::size_t view, const PixelMask& mask, bool cut_out);
 
   /// Decodes these photos in the background as far as they are not on the device.
   void prefetch(std::span<const std::size_t> views);
@@ -72,8 +79,16 @@ class PhotoCache {
   std::size_t turn_ = 0;
   bool passing_used_ = false;  // by the last step, the one of this turn
   std::optional<UploadQueue> uploads_;
-  Buffer<std::uint32_t> reduced_;
-  Kernel reduce_;
+  // What does not count of a photo.
+  struct LeftOut {
+    int width = 0;
+    int height = 0;
+    Buffer<std::uint32_t> words;
+  };
+  std::vector<LeftOut> left_out_;  // of all views, once one has some
+  bool cut_out_ = false;
+  Buffer<std::uint32_t> reduced_, masked_;
+  Kernel reduce_, mask_;
   io::ViewLoader loader_;
 };
 

@@ -146,6 +146,22 @@ TEST_CASE("a run names the photos that it left out, which are no odd ones of its
   CHECK(!contains(page, "comes far less near to"));
 }
 
+TEST_CASE("a run warns of what it has found in its capture before its first step") {
+  const Run run;
+  const auto page_of = [&](const char* warnings) {
+    run.write(
+        "metrics.json",
+        fmt::format(R"({{"complete":true,"iteration":600,"capture_warnings":{}}})", warnings));
+    return run_report(run.path());
+  };
+  const std::string page = page_of(R"(["something stands <still>","2 of 9 are grey"])");
+  CHECK(contains(page, "Something stands &lt;still&gt;."));
+  CHECK(contains(page, "2 of 9 are grey."));
+  CHECK(contains(page, "2 warnings"));
+  for (const char* damaged : {"[]", "[1,null,\"\",{}]", "{}", "7", "\"text\""})
+    CHECK(contains(page_of(damaged), "nothing to warn of"));
+}
+
 TEST_CASE("a run whose held-out photos fit where they are shifted names --poses") {
   const Run run;
   const auto names_poses = [&](double gain, int iteration, const std::string& poses,
@@ -240,7 +256,8 @@ TEST_CASE("a run whose held-out photos differ from the model by their colours na
   const Run run;
   const std::string advice =
       "Held-out photos are 2.1 dB nearer to the model once their colours are fitted, as where "
-      "exposure or white balance changes between photos: try --exposure.";
+      "exposure or white balance changes between photos: try --exposure, and judge it by "
+      "psnr_corrected.";
   const auto page_of = [&](double psnr, double corrected, int iteration = 300) {
     run.write("metrics.json", fmt::format(R"({{"complete":true,"iteration":{0},"evaluations":[
       {{"iteration":{0},"psnr":{1},"psnr_corrected":{2},"views":7}}]}})",

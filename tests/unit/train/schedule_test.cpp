@@ -273,6 +273,27 @@ TEST_CASE("photos are judged the more often the more steps a run has for each") 
   CHECK(judged(10).empty());
 }
 
+TEST_CASE("what moves is looked for from a fifth of a run on, with the option") {
+  TrainOptions options;
+  options.iterations = 600;
+  const auto looked = [&](std::size_t photos) {
+    std::vector<std::int64_t> out;
+    for (std::int64_t i = 0; i <= options.iterations; ++i) {
+      if (looks_for_motion_at(options, photos, i)) out.push_back(i);
+    }
+    return out;
+  };
+  using Iterations = std::vector<std::int64_t>;
+  CHECK(looked(10).empty());
+  options.leave_out_moving = true;
+  CHECK(looked(10) == Iterations{120, 180, 240, 300});
+  CHECK(looked(40) == Iterations{120, 180, 240, 300});
+  CHECK(looked(41) == Iterations{120, 240});
+  options.poses = true;
+  options.leave_out_odd = false;
+  CHECK(looked(10).size() == 4);
+}
+
 TEST_CASE("passes go on without views that are left out, from another iteration on") {
   const std::vector<std::size_t> odd{3, 4, 8}, apart{2, 7};
   for (const bool validates : {false, true}) {

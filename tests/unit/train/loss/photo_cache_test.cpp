@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "raysplats/io.hpp"
@@ -126,6 +127,55 @@ TEST_CASE("a reduced photo is the average over areas, of unrounded sums") {
         }
         // Steps of 8 bits are 4e-3.
         CHECK(worst < 2e-6);
+      }
+    }
+  }
+}
+
+TEST_CASE("what is left out of a photo counts for nothing, and all else as before") {
+  const Scratch scratch;
+  Context context(test_device());
+  Image mask(kWidth, kHeight, 1, 1.0f);
+  for (std::size_t i = 0; i < mask.pixels(); i += 5) mask.data[i] = i % 2 == 0 ? 0.0f : 0.4f;
+  write_image(scratch / "mask.png", mask);
+  PixelMask moves(9, 5);
+  for (const std::size_t i : {0u, 7u, 22u, 23u, 31u, 32u, 44u}) moves.set(i);
+  for (const char* type : {".png", ".exr"}) {
+    for (const bool cut_out : {false, true}) {
+      for (const bool weighted : {false, true}) {
+        if (weighted && !cut_out) continue;
+        std::vector<View> views = make_views(scratch, 2, type);
+        if (weighted) {
+          views[0].mask_path = scratch / "mask.png";
+          views[0].mask_apart = true;
+        }
+        PhotoCache cache(context, views, 100 * kBytes, 2);
+        cache.leave_out(0, moves, cut_out);
+        for (const auto& [width, height] : {std::pair{kWidth, kHeight}, std::pair{18, 11}}) {
+          CAPTURE(width);
+          const auto photo_of = [&](const DevicePhoto& photo) {
+            return io::Photo{width, height, photo.planes, photo.weighted, photo.words.download()};
+          };
+          const io::Photo whole = photo_of(cache.get_whole(0, width, height));
+          const io::Photo rest = photo_of(cache.get(0, width, height));
+          REQUIRE(rest.weighted == (weighted || cut_out));
+          CHECK(whole.weighted == weighted);
+          for (int y = 0; y < height; ++y) {
+            for (int x = 0; x < width; ++x) {
+              const bool out = moves[static_cast<std::size_t>(y * 5 / height * 9 + x * 9 / width)];
+              std::array<float, 4> expected = whole.at(x, y);
+              if (out && !cut_out) expected[3] = 0.0f;
+              CHECK(rest.at(x, y) == expected);
+              if (!cut_out) continue;
+              CHECK(rest.weight(x, y) == (out ? 0.0f : weighted ? whole.weight(x, y) : 1.0f));
+            }
+          }
+          // Other photos, and this one once it is taken back, are as they were.
+          CHECK(photo_of(cache.get(1, width, height)).words ==
+                photo_of(cache.get_whole(1, width, height)).words);
+        }
+        cache.leave_out(0, {}, cut_out);
+        CHECK(cache.get(0, kWidth, kHeight).words.download() == io::load_photo(views[0]).words);
       }
     }
   }

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "raysplats/camera.hpp"
+#include "scene/image/pixel_mask.hpp"
+
+namespace raysplats {
+
+/// A photo beside a model's picture of it.
+struct ComparedPhoto {
+  Camera camera;             ///< that takes pictures of this size
+  std::vector<float> error;  ///< fitted_error()
+  std::vector<float> depth;  ///< ViewTracer::depth(), the median one; 0 where nothing is
+};
+
+/// How far a picture is from its photo in each pixel: the root mean square over R, G and B of the
+/// mean difference of 3 x 3 pixels, once an affine map has brought the picture's colours as near to
+/// the photo's as it can (least squares whose weights fall with the difference, so that what moves
+/// has little say). `picture`: planar R, G, B; `photo`: the same and how much a pixel counts; 0
+/// where nothing does. `width` x `height` pixels each.
+std::vector<float> fitted_error(std::span<const float> picture,
+                                std::span<const float> photo,
+                                int width,
+                                int height);
+
+/// Of each photo, what it shows of things that move or change: pixels that are far from the model
+/// although most of up to 16 photos that see the same place are near to it there. A place where all
+/// of them are far is one that the model lacks. Far is an error of 0.05 that is joined to one of
+/// 0.12, or three and six times the median of all where that is more; a pixel all around is marked
+/// too. A place is the median depth of the model, and seen by a photo whose own depth there is not
+/// less than 0.85 of its distance. O(photos^2 + photos x pixels).
+std::vector<PixelMask> moving_areas(std::span<const ComparedPhoto> photos);
+
+}  // namespace raysplats

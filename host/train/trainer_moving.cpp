@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+// What moves or changes from photo to photo, as people and cars. A model that is trained on it
+// shows it as haze and ghosts.
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "eval/moving_areas.hpp"
+#include "train/schedule.hpp"
+#include "train/step_options.hpp"
+#include "train/trainer_impl.hpp"
+
+namespace raysplats {
+namespace {
+
+// Pixels of the longer side of a picture at most: what a model lacks of a close-up does not move.
+constexpr int kSide = 96;
+constexpr std::uint32_t kHalf = 0xffffu;  // of a word, which a float of a checkpoint holds exactly
+
+Camera small_camera(const Camera& full) {
+  const int divisor = (std::max(full.width, full.height) + kSide - 1) / kSide;
+  return divisor > 1 ? downscaled(full, divisor) : full;
+}
+
+// Planar R, G, B and how much a pixel counts.
+std::vector<float> counted_photo(const DevicePhoto& device,
+                                 const Camera& camera,
+                                 bool cut_out,
+                                 const std::array<float, 3>& background) {
+  const io::Photo photo{camera.width, camera.height, device.planes, device.weighted,
+                        device.words.download()};
+  const std::size_t pixels = photo.pixels();
+  std::vector<float> out(4 * pixels);
+  for (int y = 0; y < photo.height; ++y) {
+    for (int x = 0; x < photo.width; ++x) {
+      const auto at = static_cast<std::size_t>(y) * static_cast<std::size_t>(photo.width) +
+                      static_cast<std::size_t>(x);
+      const std::array<float, 4> pixel = photo.at(x, y);
+      for (std::size_t c = 0; c < 3; ++c)
+        out[c * pixels + at] =
+            cut_out ? pixel[3] * pixel[c] + (1 - pixel[3]) * background[c] : pixel[c];
+      out[3 * pixels + at] = cut_out ? photo.weight(x, y) : pixel[3];
+    }
+  }
+  return out;
+}
+
+// What store_moving() has written of so many photos.
+std::vector<PixelMask> masks_of(std::span<const float> numbers, std::size_t photos) {
+  const auto refuse = [] {
+    throw DataError(
+        "The checkpoint leaves out parts of photos that its run does not have: resume from "
+        "another one");
+  };
+  const auto next = [&](std::uint32_t most) {
+    if (numbers.empty() || !(numbers[0] >= 0 && numbers[0] <= static_cast<float>(most))) refuse();
+    const auto out = static_cast<std::uint32_t>(numbers[0]);
+    numbers = numbers.subspan(1);
+    return out;
+  };
+  std::vector<PixelMask> out(photos);
+  for (PixelMask& mask : out) {
+    const auto width = static_cast<int>(next(kSide)), height = static_cast<int>(next(kSide));
+    mask = PixelMask(width, height);
+    for (std::uint32_t& word : mask.words) {
+      word = next(kHalf);
+      word |= next(kHalf) << 16;
+    }
+  }
+  if (!numbers.empty()) refuse();
+  return out;
+}
+
+}  // namespace
+
+std::vector<PixelMask> Trainer::Impl::moving_views() {
+  TraceOptions traced = trace_options();
+  traced.depth = true;
+  ViewTracer judge(context, traced);
+  std::vector<ComparedPhoto> photos;
+  std::vector<std::size_t> views;
+  for (std::size_t view = 0; view < train_views.size(); ++view) {
+    if (iteration < join_iteration() && std::binary_search(apart.begin(), apart.end(), view))
+      continue;
+    ComparedPhoto compared;
+    compared.camera = small_camera(poses ? poses->camera(view) : train_cameras[view]);
+    const int width = compared.camera.width, height = compared.camera.height;
+    judge.forward(gaussians, compared.camera);
+    const std::vector<float> picture = judge.image().download();
+    const std::vector<float> photo = counted_photo(photo_cache.get_whole(view, width, height),
+                                                   compared.camera, cut_out, background);
+    compared.error = fitted_error(picture, photo, width, height);
+    const std::vector<float> depths = judge.depth().download();
+    const auto pixels = static_cast<std::ptrdiff_t>(compared.error.size());
+    compared.depth.assign(depths.begin() + pixels, depths.begin() + 2 * pixels);
+    photos.push_back(std::move(compared));
+    views.push_back(view);
+  }
+  std::vector<PixelMask> found = moving_areas(photos);
+  std::vector<PixelMask> out(train_views.size());
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (count(found[i]) > 0) out[views[i]] = std::move(found[i]);
+  }
+  return out;
+}
+
+void Trainer::Impl::set_moving(std::vector<PixelMask> found) {
+  for (std::size_t view = 0; view < found.size(); ++view) {
+    if (found[view] != moving[view]) photo_cache.leave_out(view, found[view], cut_out);
+  }
+  moving = std::move(found);
+}
+
+// All ranks do what the first one finds.
+void Trainer::Impl::leave_out_moving_areas() {
+  finish_steps();
+  std::vector<PixelMask> found(train_views.size());
+  if (ranks.leads()) found = moving_views();
+  for (PixelMask& mask : found) {
+    mask.width = ranks.broadcast_value(0, mask.width);
+    mask.height = ranks.broadcast_value(0, mask.height);
+    mask.words.resize(ranks.broadcast_value(0, mask.words.size()));
+    ranks.broadcast(std::as_writable_bytes(std::span(mask.words)));
+  }
+  set_moving(std::move(found));
+  if (!ranks.leads()) return;
+  double share = 0;
+  std::size_t photos = 0;
+  for (const PixelMask& mask : moving) {
+    share += marked_share(mask) / static_cast<double>(moving.size());
+    photos += mask.width > 0 ? 1 : 0;
+  }
+  const double last_share = moving_shares(options, loss_views()).back();
+  const bool last = iteration >= std::llround(last_share * static_cast<double>(options.iterations));
+  spdlog::log(last ? spdlog::level::info : spdlog::level::debug,
+              "iteration {}: {:.1f} % of the training photos, in {} of {}, show what moves or "
+              "changes, and are left out",
+              iteration, 100 * share, photos, moving.size());
+}
+
+void Trainer::Impl::store_moving(CheckpointSections& sections) const {
+  if (std::all_of(moving.begin(), moving.end(), [](const PixelMask& m) { return m.width == 0; }))
+    return;
+  sections["moving"] = [this] {
+    std::vector<float> out;
+    for (const PixelMask& mask : moving) {
+      out.push_back(static_cast<float>(mask.width));
+      out.push_back(static_cast<float>(mask.height));
+      for (const std::uint32_t word : mask.words) {
+        out.push_back(static_cast<float>(word & kHalf));
+        out.push_back(static_cast<float>(word >> 16));
+      }
+    }
+    return out;
+  };
+}
+
+// A run that is told to train on what moves from here on does.
+void Trainer::Impl::restore_moving(const Checkpoint& checkpoint) {
+  const auto section = checkpoint.sections.find("moving");
+  const bool has = section != checkpoint.sections.end() && options.leave_out_moving;
+  set_moving(has ? masks_of(section->second, train_views.size())
+                 : std::vector<PixelMask>(train_views.size()));
+}
+
+}  // namespace raysplats

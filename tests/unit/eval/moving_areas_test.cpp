@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "eval/moving_areas.hpp"
+
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+#include <numbers>
+#include <vector>
+
+#include "scene/camera/camera_model.hpp"
+#include "scene/camera/view_axes.hpp"
+#include "scene/image/pixel_count.hpp"
+#include "util/rng.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+constexpr int kWidth = 60;
+constexpr int kHeight = 40;
+constexpr std::size_t kPixels = std::size_t{kWidth} * kHeight;
+
+/// Cameras in front of the wall z = 0, which look at it from a little apart.
+std::vector<Camera> before_wall(std::size_t count) {
+  std::vector<Camera> out;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double x = 0.6 * static_cast<double>(i) / static_cast<double>(count) - 0.3;
+    out.push_back(
+        look_at({x, 0.1 * std::cos(9 * x), -4}, {x / 2, 0, 0}, {0, 1, 0}, kWidth, kHeight, kWidth));
+  }
+  return out;
+}
+
+/// What a model that has the wall and nothing else knows: no error, and how far away it is.
+ComparedPhoto wall_photo(const Camera& camera) {
+  ComparedPhoto out{camera, std::vector<float>(kPixels), std::vector<float>(kPixels)};
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    const CameraRay ray = camera_ray(camera, static_cast<double>(i % kWidth) + 0.5,
+                                     static_cast<double>(i / kWidth) + 0.5);
+    const double along = -ray.origin.z / ray.direction.z;
+    out.depth[i] = static_cast<float>(along * glm::dot(ray.direction, view_axis(camera)));
+  }
+  return out;
+}
+
+struct Square {
+  int left, top, side;
+
+  bool holds(std::size_t pixel) const {
+    const int x = static_cast<int>(pixel) % kWidth, y = static_cast<int>(pixel) / kWidth;
+    return x >= left && x < left + side && y >= top && y < top + side;
+  }
+};
+
+void add_error(ComparedPhoto& photo, const Square& square, float error) {
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    if (square.holds(i)) photo.error[i] = error;
+  }
+}
+
+std::vector<ComparedPhoto> wall_photos(std::size_t count) {
+  std::vector<ComparedPhoto> out;
+  for (const Camera& camera : before_wall(count)) out.push_back(wall_photo(camera));
+  return out;
+}
+
+/// Where the wall's point (x, y) is seen.
+Square about(const Camera& camera, double x, double y, int side) {
+  const auto place = project_into(camera, {x, y, 0});
+  REQUIRE(place);
+  return {static_cast<int>(place->x) - side / 2, static_cast<int>(place->y) - side / 2, side};
+}
+
+}  // namespace
+
+TEST_CASE("a picture whose colours are an affine map of the photo's has no error") {
+  CounterRng rng(3, 0);
+  std::vector<float> picture(3 * kPixels), photo(4 * kPixels, 1.0f);
+  for (float& value : picture) value = static_cast<float>(rng.uniform());
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    const std::array<float, 3> own{picture[i], picture[kPixels + i], picture[2 * kPixels + i]};
+    photo[i] = 0.7f * own[0] + 0.1f * own[2] + 0.05f;
+    photo[kPixels + i] = 0.9f * own[1] - 0.1f * own[0];
+    photo[2 * kPixels + i] = 0.5f * own[2] + 0.2f;
+  }
+  for (const float error : fitted_error(picture, photo, kWidth, kHeight)) CHECK(error < 1e-4f);
+}
+
+TEST_CASE("a thing before a tenth of a photo has the error that it is, and all else next to none") {
+  CounterRng rng(3, 1);
+  std::vector<float> picture(3 * kPixels), photo(4 * kPixels, 1.0f);
+  for (float& value : picture) value = static_cast<float>(0.2 + 0.4 * rng.uniform());
+  std::copy(picture.begin(), picture.end(), photo.begin());
+  const Square thing{20, 10, 15};
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    if (!thing.holds(i)) continue;
+    for (std::size_t c = 0; c < 3; ++c) photo[c * kPixels + i] = picture[c * kPixels + i] + 0.3f;
+  }
+  const std::vector<float> error = fitted_error(picture, photo, kWidth, kHeight);
+  const Square inside{21, 11, 13}, beside{19, 9, 17};
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    if (inside.holds(i)) CHECK(error[i] == doctest::Approx(0.3).epsilon(0.1));
+    if (!beside.holds(i)) CHECK(error[i] < 0.02f);
+  }
+  // What does not count has none, and no say.
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    if (thing.holds(i)) photo[3 * kPixels + i] = 0.0f;
+  }
+  for (const float each : fitted_error(picture, photo, kWidth, kHeight)) CHECK(each < 1e-4f);
+  std::fill(photo.begin() + 3 * kPixels, photo.end(), 0.0f);
+  for (const float each : fitted_error(picture, photo, kWidth, kHeight)) CHECK(each == 0.0f);
+}
+
+TEST_CASE("what one photo shows and others do not moves; what all lack does not") {
+  std::vector<ComparedPhoto> photos = wall_photos(12);
+  const Square thing{20, 12, 10};
+  add_error(photos[3], thing, 0.2f);
+  // A place that the model has wrong, in all photos.
+  for (ComparedPhoto& photo : photos) add_error(photo, about(photo.camera, -0.6, 0.4, 9), 0.3f);
+  const std::vector<PixelMask> found = moving_areas(photos);
+  REQUIRE(found.size() == photos.size());
+  const Square around{thing.left - 1, thing.top - 1, thing.side + 2};
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    INFO(i);
+    if (i != 3) CHECK(count(found[i]) == 0);
+  }
+  for (std::size_t pixel = 0; pixel < kPixels; ++pixel)
+    CHECK(found[3][pixel] == around.holds(pixel));
+}
+
+TEST_CASE("small and faint errors are none of things that move, but for what is joined to one") {
+  std::vector<ComparedPhoto> photos = wall_photos(12);
+  add_error(photos[1], {5, 5, 2}, 0.5f);    // smaller than three pixels
+  add_error(photos[2], {5, 5, 10}, 0.1f);   // faint
+  add_error(photos[4], {20, 5, 10}, 0.1f);  // joined
+  add_error(photos[4], {24, 9, 3}, 0.3f);
+  add_error(photos[4], {40, 20, 10}, 0.1f);  // apart from it
+  const std::vector<PixelMask> found = moving_areas(photos);
+  CHECK(count(found[1]) == 0);
+  CHECK(count(found[2]) == 0);
+  CHECK(count(found[4]) == 12 * 12);
+  // Where all is as far as that, nothing is.
+  for (ComparedPhoto& photo : photos)
+    for (float& error : photo.error) error = std::max(error, 0.06f);
+  for (const PixelMask& mask : moving_areas(photos)) CHECK(count(mask) == 0);
+}
+
+TEST_CASE("what a model has before one camera alone is its fault, not the photo's") {
+  std::vector<ComparedPhoto> photos = wall_photos(12);
+  const Square floater{20, 12, 10};
+  add_error(photos[3], floater, 0.3f);
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    if (floater.holds(i)) photos[3].depth[i] = 2.0f;  // others look through it
+  }
+  for (const PixelMask& mask : moving_areas(photos)) CHECK(count(mask) == 0);
+}
+
+TEST_CASE("nothing moves where few photos see the place, nor among none") {
+  std::vector<ComparedPhoto> photos = wall_photos(4);
+  add_error(photos[1], {20, 12, 10}, 0.3f);
+  for (const PixelMask& mask : moving_areas(photos)) CHECK(count(mask) == 0);
+  CHECK(moving_areas({}).empty());
+  // The same photo beside others that are hidden from the place by what is before them.
+  photos = wall_photos(12);
+  add_error(photos[1], {20, 12, 10}, 0.3f);
+  CHECK(count(moving_areas(photos)[1]) > 0);
+  for (std::size_t i = 0; i < photos.size(); ++i) {
+    if (i != 1) std::fill(photos[i].depth.begin(), photos[i].depth.end(), 1.0f);
+  }
+  for (const PixelMask& mask : moving_areas(photos)) CHECK(count(mask) == 0);
+}
+
+TEST_CASE("things that move are found by panoramas, and before a sky") {
+  std::vector<ComparedPhoto> photos;
+  for (int i = 0; i < 9; ++i) {
+    Camera camera = look_at({0.1 * i, 0, 0}, {0.1 * i, 0, 1}, {0, -1, 0}, kWidth, kHeight, 20);
+    set_equirectangular(camera);
+    photos.push_back({camera, std::vector<float>(kPixels), std::vector<float>(kPixels, 5.0f)});
+    for (std::size_t pixel = 0; pixel < kPixels / 2; ++pixel) photos.back().depth[pixel] = 0.0f;
+  }
+  add_error(photos[2], {10, 4, 8}, 0.3f);
+  add_error(photos[6], {30, 26, 8}, 0.3f);
+  const std::vector<PixelMask> found = moving_areas(photos);
+  for (std::size_t i = 0; i < photos.size(); ++i)
+    CHECK(count(found[i]) == (i == 2 || i == 6 ? 100 : 0));
+}

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+// Runs on photos in which something moves.
+#include <doctest/doctest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "comm/thread_ranks.hpp"
+#include "raysplats/context.hpp"
+#include "raysplats/dataset.hpp"
+#include "raysplats/error.hpp"
+#include "raysplats/gaussians.hpp"
+#include "raysplats/io.hpp"
+#include "raysplats/trainer.hpp"
+#include "run/checkpoint.hpp"
+#include "unit/fixture.hpp"
+#include "unit/train/photographed.hpp"
+#include "unit/train/short_training.hpp"
+#include "util/rng.hpp"
+
+using namespace raysplats;
+
+namespace {
+
+constexpr int kPhotos = 30;
+constexpr int kSize = 48;
+constexpr int kBox = 16;  // pixels of a side
+
+std::vector<Camera> ring() {
+  std::vector<Camera> out;
+  for (int i = 0; i < kPhotos; ++i) {
+    const double angle = 2 * std::numbers::pi * i / kPhotos;
+    out.push_back(look_at({4 * std::cos(angle), 4 * std::sin(angle), i % 2}, {0, 0, 0}, {0, 0, 1},
+                          kSize, kSize, 52));
+  }
+  return out;
+}
+
+/// Photos all around, before which a box goes in all that are trained on.
+struct Crowded : Photographed {
+  explicit Crowded(bool boxes = true) : Photographed(coloured_cloud(400, 1.0, 8), ring()) {
+    CounterRng rng(5, 2);
+    for (const float position : coloured_cloud(400, 1.0, 8).means) {
+      dataset.points.positions.push_back(position + static_cast<float>(0.05 * rng.normal()));
+      dataset.points.colors.push_back(0.5f);
+    }
+    if (!boxes) return;
+    for (const View& view : dataset.views) {
+      const int left = static_cast<int>(rng.below(kSize - kBox)),
+                top = static_cast<int>(rng.below(kSize - kBox));
+      if (view.test) continue;
+      Image photo = read_image(view.image_path);
+      for (int y = top; y < top + kBox; ++y) {
+        for (int x = left; x < left + kBox; ++x) {
+          for (int c = 0; c < 3; ++c) photo.at(x, y, c) = c == 1 ? 0.9f : 0.1f;
+        }
+      }
+      write_image(view.image_path, photo);
+    }
+  }
+};
+
+TrainOptions leaving_out(int iterations) {
+  TrainOptions options = short_training(iterations);
+  options.init = "colmap";
+  options.max_gaussians = 2000;
+  options.leave_out_moving = true;
+  options.leave_out_odd = false;
+  return options;
+}
+
+/// The share of the photos that a run says it has left out.
+double share_left_out(const std::filesystem::path& run) {
+  double sum = 0;
+  const auto metrics = nlohmann::json::parse(std::ifstream(run / "metrics.json"));
+  for (const nlohmann::json& photo : metrics.at("photos")) sum += photo.value("moving", 0.0);
+  return sum / static_cast<double>(metrics.at("photos").size());
+}
+
+}  // namespace
+
+TEST_CASE("what moves in the photos is left out of a run, which gains by it") {
+  const Crowded data;
+  const auto trained = [&](bool leaves_out) {
+    TrainOptions options = leaving_out(900);
+    options.leave_out_moving = leaves_out;
+    const std::filesystem::path run = data.folder / (leaves_out ? "without" : "with");
+    Trainer trainer(shared_test_context(), data.dataset, options, run);
+    const double psnr = trainer.run(false).evaluations.back().psnr;
+    const double share = share_left_out(run);
+    constexpr double kBoxes = static_cast<double>(kBox * kBox) / (kSize * kSize);
+    if (leaves_out) {
+      MESSAGE(share << " of " << kBoxes << " left out");
+      CHECK(share > 0.6 * kBoxes);
+      CHECK(share < 1.8 * kBoxes);
+    } else {
+      CHECK(share == 0);
+    }
+    return psnr;
+  };
+  const double with = trained(false), without = trained(true);
+  MESSAGE("with what moves " << with << " dB, without " << without << " dB");
+  CHECK(without > with + 1);
+}
+
+TEST_CASE("photos in which nothing moves are trained on whole, but for little") {
+  const Crowded data(false);
+  const TrainOptions options = leaving_out(600);
+  Trainer(shared_test_context(), data.dataset, options, data.folder / "run").run(false);
+  CHECK(share_left_out(data.folder / "run") < 0.01);
+}
+
+TEST_CASE("a run that is resumed leaves out what it would have, bit for bit") {
+  const Crowded data;
+  TrainOptions options = leaving_out(400);
+  options.trace.deterministic = true;
+  options.checkpoint_every = 20;
+  options.keep_checkpoints = 99;
+  Trainer straight(shared_test_context(), data.dataset, options, data.folder / "straight");
+  straight.run(false);
+  for (const int from : {60, 80, 140, 300}) {
+    INFO(from);
+    const std::filesystem::path run = data.folder / std::to_string(from);
+    Trainer resumed(shared_test_context(), data.dataset, options, run);
+    resumed.resume(checkpoint_path(data.folder / "straight", from));
+    resumed.run(false);
+    CHECK(share_left_out(run) == share_left_out(data.folder / "straight"));
+    check_equal(straight.model(), resumed.model());
+  }
+  // Told to train on it from here on, it does.
+  options.leave_out_moving = false;
+  Trainer kept(shared_test_context(), data.dataset, options, data.folder / "kept");
+  kept.resume(checkpoint_path(data.folder / "straight", 300));
+  kept.run(false);
+  CHECK(share_left_out(data.folder / "kept") == 0);
+  CHECK(straight.model().means != kept.model().means);
+}
+
+TEST_CASE("ranks leave out the same as one does, and train the same model") {
+  const Crowded data;
+  TrainOptions options = leaving_out(200);
+  options.trace.deterministic = true;
+  options.views_per_step = 2;
+  Context first(test_device()), second(test_device());
+  const std::array<Context*, 2> contexts{&first, &second};
+  Trainer alone(first, data.dataset, options, data.folder / "alone");
+  alone.run(false);
+  std::array<Gaussians, 2> models;
+  run_thread_ranks(2, [&](Communicator& ranks) {
+    const auto rank = static_cast<std::size_t>(ranks.rank());
+    Trainer trainer(*contexts[rank], data.dataset, options, data.folder / std::to_string(rank),
+                    false, &ranks);
+    trainer.run(false);
+    models[rank] = trainer.model();
+  });
+  CHECK(share_left_out(data.folder / "0") == share_left_out(data.folder / "alone"));
+  CHECK(share_left_out(data.folder / "0") > 0);
+  for (const Gaussians& model : models) check_equal(alone.model(), model);
+}
+
+TEST_CASE("checkpoints that leave out parts of other photos are refused") {
+  const Crowded data;
+  TrainOptions options = leaving_out(60);
+  options.checkpoint_every = 40;
+  Trainer(shared_test_context(), data.dataset, options, data.folder / "run").run(false);
+  Checkpoint checkpoint = read_checkpoint(checkpoint_path(data.folder / "run", 40));
+  REQUIRE(checkpoint.sections.contains("moving"));
+  const auto damaged = [&](auto&& damage) {
+    Checkpoint other = checkpoint;
+    damage(other.sections.at("moving"));
+    write_checkpoint(data.folder / "damaged.rsck", other);
+    Trainer trainer(shared_test_context(), data.dataset, options, data.folder / "resumed", true);
+    CHECK_THROWS_AS(trainer.resume(data.folder / "damaged.rsck"), DataError);
+  };
+  damaged([](std::vector<float>& numbers) { numbers.pop_back(); });
+  damaged([](std::vector<float>& numbers) { numbers.front() = -1; });
+  damaged([](std::vector<float>& numbers) { numbers.front() = 1e9f; });
+  damaged([](std::vector<float>& numbers) { numbers.push_back(1); });
+}
