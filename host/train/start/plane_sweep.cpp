@@ -48,6 +48,7 @@ constexpr double kFloorCost = 1e-4;  // of photos' noise
 constexpr double kWrongGuess = 3.0;  // factor
 constexpr double kOpenShare = 0.5;   // of probes that see no end of the depths: most are open
 constexpr double kForegroundShare = 0.05;  // of probes that agree about something before the open
+constexpr double kBackgroundShare = 0.04;  // of those about something beyond a range
 constexpr double kClearlyMore = 1.2;       // times as many pixels agree about another depth
 constexpr int kRounds = 4;                 // of looking for other depths
 constexpr double kMuchNearer = 0.65;       // than the typical one, as a share of it
@@ -421,14 +422,14 @@ SweptPoints swept_points(std::span<const SmallPhoto> photos,
   return out;
 }
 
-PointCloud foreground_points(std::span<const SmallPhoto> photos,
-                             double guess,
-                             std::size_t count,
-                             std::uint64_t seed) {
-  const auto [depths, found] = settled(photos, depths_around(guess), seed);
+namespace {
+
+// `count` at most, where photos agree about a depth within the range.
+PointCloud agreed_points(std::span<const SmallPhoto> photos,
+                         const DepthRange& depths,
+                         std::size_t count,
+                         std::uint64_t seed) {
   PointCloud out;
-  if (static_cast<double>(found.inside) <= kForegroundShare * static_cast<double>(found.shown))
-    return out;
   Sweep sweep(photos, depths, seed);
   for (std::size_t tried = 0; tried < kTriesPerPoint && sweep.agreed() < count; ++tried)
     sweep.take(count);
@@ -438,6 +439,33 @@ PointCloud foreground_points(std::span<const SmallPhoto> photos,
       append_point(out, sample.position(), sample.color());
   }
   return out;
+}
+
+}  // namespace
+
+PointCloud foreground_points(std::span<const SmallPhoto> photos,
+                             double guess,
+                             std::size_t count,
+                             std::uint64_t seed) {
+  const auto [depths, found] = settled(photos, depths_around(guess), seed);
+  if (static_cast<double>(found.inside) <= kForegroundShare * static_cast<double>(found.shown))
+    return {};
+  return agreed_points(photos, depths, count, seed);
+}
+
+PointCloud background_points(std::span<const SmallPhoto> photos,
+                             const DepthRange& depths,
+                             std::size_t count,
+                             std::uint64_t seed) {
+  const DepthRange beyond = depths_around(depths.farthest);
+  const Agreement far = agreement(photos, beyond, seed);
+  if (static_cast<double>(far.inside) <= kBackgroundShare * static_cast<double>(far.shown))
+    return {};
+  const Agreement near = agreement(photos, depths, seed);
+  const double share =
+      static_cast<double>(far.inside) / static_cast<double>(far.inside + near.inside);
+  return agreed_points(photos, beyond, static_cast<std::size_t>(share * static_cast<double>(count)),
+                       seed);
 }
 
 SweptPoints searched_points(std::span<const SmallPhoto> photos,
@@ -451,13 +479,13 @@ SweptPoints searched_points(std::span<const SmallPhoto> photos,
       "cameras){}",
       depths.nearest, depths.farthest, depths.typical, guess,
       depths.open ? "; they leave depths open" : "");
-  PointCloud foreground;
-  if (depths.open) foreground = foreground_points(photos, guess, count / 2, seed);
-  SweptPoints out = swept_points(photos, depths, count - foreground.size(), unsure, seed);
-  if (foreground.size() > 0) {
-    spdlog::debug("{} points of the start stand before what is too far to tell its depth",
-                  foreground.size());
-    for (std::size_t i = 0; i < foreground.size(); ++i) append_point(foreground, i, out.points);
+  const PointCloud beside = depths.open ? foreground_points(photos, guess, count / 2, seed)
+                                        : background_points(photos, depths, count, seed);
+  SweptPoints out = swept_points(photos, depths, count - beside.size(), unsure, seed);
+  if (beside.size() > 0) {
+    spdlog::debug("{} points of the start stand {}", beside.size(),
+                  depths.open ? "before what is too far to tell its depth" : "beyond these depths");
+    for (std::size_t i = 0; i < beside.size(); ++i) append_point(beside, i, out.points);
   }
   return out;
 }

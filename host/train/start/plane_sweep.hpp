@@ -57,8 +57,16 @@ PointCloud foreground_points(std::span<const SmallPhoto> photos,
                              std::size_t count,
                              std::uint64_t seed);
 
+/// Points of what lies beyond the depths of a sweep, as mountains behind a terrace: what agrees
+/// about a depth around `depths.farthest`, in photos farther apart. As many of `count` as pixels
+/// agree there, of those that agree there or in `depths`. None where 4 % of the pixels or fewer do.
+PointCloud background_points(std::span<const SmallPhoto> photos,
+                             const DepthRange& depths,
+                             std::size_t count,
+                             std::uint64_t seed);
+
 /// As swept_points(), in the depths that swept_depths() finds. Where these are open, what stands
-/// before them is swept as well, for up to half of `count`.
+/// before them is swept as well, for up to half of `count`; else what lies beyond them.
 SweptPoints searched_points(std::span<const SmallPhoto> photos,
                             double guess,
                             std::size_t count,

@@ -275,6 +275,43 @@ TEST_CASE("what stands before far mountains is found though most pixels tell no 
   CHECK(before == points.size());
 }
 
+TEST_CASE("what lies far beyond what most pixels show is found as well") {
+  // A wall in the lower part of the photos, and another fifteen times as far behind it.
+  const auto walls = [](const CameraRay& ray) {
+    glm::dvec3 p = ray.origin + 4.0 / ray.direction.x * ray.direction;
+    const bool near = p.z < 0.4;
+    if (!near) p = (ray.origin + 60.0 / ray.direction.x * ray.direction) / 15.0;
+    return glm::dvec4(0.5 + 0.4 * std::sin(11 * p.y + 5 * p.z),
+                      0.5 + 0.4 * std::cos(9 * p.z - 7 * p.y),
+                      0.5 + 0.4 * std::sin(8 * p.y - 6 * p.z), 1.0);
+  };
+  std::vector<SmallPhoto> photos;
+  for (int i = 0; i < 25; ++i) {
+    const glm::dvec3 eye(0, 0.6 * (i - 12), 0.1 * (i % 3 - 1));
+    photos.push_back(
+        photo_of(look_at(eye, eye + glm::dvec3(1, 0, 0), {0, 0, 1}, 96, 72, 80), walls));
+  }
+  const DepthRange depths = swept_depths(photos, 4.0, 3);
+  CHECK(!depths.open);
+  CHECK(depths.farthest < 50.0);
+  const PointCloud points = background_points(photos, depths, 400, 3);
+  CHECK(points.positions == background_points(photos, depths, 400, 3).positions);
+  std::size_t found = 0;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    found += std::abs(points.positions[3 * i] - 60.0f) < 10.0f ? 1 : 0;
+  MESSAGE(found << " of " << points.size() << " points on the wall behind");
+  CHECK(points.size() > 30);
+  CHECK(points.size() < 300);
+  CHECK(found > points.size() * 7 / 10);
+  // A start has both, and together no more than it asked for.
+  const PointCloud all = searched_points(photos, 4.0, 400, 0.25, 3).points;
+  CHECK(all.size() > 390);
+  CHECK(all.size() <= 400);
+  // Where next to nothing is there, none are taken.
+  const std::vector<SmallPhoto> one = photos_of_wall();
+  CHECK(background_points(one, swept_depths(one, 3.0, 3), 400, 3).size() == 0);
+}
+
 TEST_CASE("cameras turned at arm's length find what is around them") {
   // Their axes meet where the one who turns stands, which tells nothing of what they look at.
   const auto room = [](const CameraRay& ray) { return ball(ray, 2.5); };
