@@ -10,6 +10,7 @@
 #include <glm/matrix.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <iterator>
 #include <limits>
 #include <optional>
 
@@ -100,7 +101,8 @@ std::optional<glm::dvec3> place_of(const ComparedPhoto& photo, std::size_t pixel
   const int y = static_cast<int>(pixel) / photo.camera.width;
   const CameraRay ray = camera_ray(photo.camera, x + 0.5, y + 0.5);
   if (!ray.valid) return std::nullopt;
-  const double depth = photo.depth[pixel] > 0 ? static_cast<double>(photo.depth[pixel]) : sky;
+  const auto depth = static_cast<double>(photo.depth[pixel]);
+  if (!(depth > 0)) return ray.origin + sky * ray.direction;
   const double along =
       is_along_ray(photo.camera.model) ? 1.0 : glm::dot(ray.direction, view_axis(photo.camera));
   return ray.origin + depth / along * ray.direction;
@@ -119,9 +121,11 @@ std::optional<double> error_at(const ComparedPhoto& photo, const glm::dvec3& pla
   const int y = std::min(static_cast<int>(point->y), photo.camera.height - 1);
   const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(photo.camera.width) +
                      static_cast<std::size_t>(x);
-  const double depth = photo.depth[pixel] > 0 ? static_cast<double>(photo.depth[pixel]) : sky;
-  const double own = depth_in(photo.camera, place);
-  if (depth < kHidden * own) return std::nullopt;
+  const bool shows = photo.depth[pixel] > 0;
+  const double own =
+      shows ? depth_in(photo.camera, place) : glm::distance(place, photo.camera.center());
+  const double depth = shows ? static_cast<double>(photo.depth[pixel]) : sky;
+  if (std::isnan(photo.error[pixel]) || depth < kHidden * own) return std::nullopt;
   if (depth * kHidden > own) return std::numeric_limits<double>::infinity();
   return photo.error[pixel];
 }
@@ -199,15 +203,16 @@ std::vector<float> fitted_error(std::span<const float> picture,
                          (difference[c][i] - static_cast<double>(photo[c * pixels + i]));
     }
   }
-  std::vector<float> out(pixels);
+  std::vector<float> out(pixels, std::numeric_limits<float>::quiet_NaN());
   for (std::size_t i = 0; i < pixels; ++i) {
+    if (!(photo[3 * pixels + i] > 0)) continue;
     glm::dvec3 sum(0.0);
     double counted = 0;
     for_neighbours({width, height}, i, [&](std::size_t other) {
       sum += glm::dvec3(difference[0][other], difference[1][other], difference[2][other]);
       counted += static_cast<double>(photo[3 * pixels + other]);
     });
-    if (counted > 0) out[i] = static_cast<float>(std::sqrt(glm::dot(sum, sum) / 3) / counted);
+    out[i] = static_cast<float>(std::sqrt(glm::dot(sum, sum) / 3) / counted);
   }
   return out;
 }
@@ -219,7 +224,8 @@ std::vector<PixelMask> moving_areas(std::span<const ComparedPhoto> photos) {
     placed[i].center = photos[i].camera.center();
     if (photos[i].camera.model != CameraModel::kEquirectangular)
       placed[i].direction = view_axis(photos[i].camera);
-    errors.insert(errors.end(), photos[i].error.begin(), photos[i].error.end());
+    std::ranges::copy_if(photos[i].error, std::back_inserter(errors),
+                         [](float error) { return !std::isnan(error); });
     for (const float depth : photos[i].depth)
       if (depth > 0) depths.push_back(static_cast<double>(depth));
   }

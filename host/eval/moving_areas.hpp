@@ -19,8 +19,8 @@ struct ComparedPhoto {
 /// How far a picture is from its photo in each pixel: the root mean square over R, G and B of the
 /// mean difference of 3 x 3 pixels, once an affine map has brought the picture's colours as near to
 /// the photo's as it can (least squares whose weights fall with the difference, so that what moves
-/// has little say). `picture`: planar R, G, B; `photo`: the same and how much a pixel counts; 0
-/// where nothing does. `width` x `height` pixels each.
+/// has little say). `picture`: planar R, G, B; `photo`: the same and how much a pixel counts; not a
+/// number where it does not. `width` x `height` pixels each.
 std::vector<float> fitted_error(std::span<const float> picture,
                                 std::span<const float> photo,
                                 int width,
@@ -30,8 +30,9 @@ std::vector<float> fitted_error(std::span<const float> picture,
 /// although most of up to 16 photos that see the same place are near to it there. A place where all
 /// of them are far is one that the model lacks. Far is an error of 0.05 that is joined to one of
 /// 0.12, or three and six times the median of all where that is more; a pixel all around is marked
-/// too. A place is the median depth of the model, and seen by a photo whose own depth there is not
-/// less than 0.85 of its distance. O(photos^2 + photos x pixels).
+/// too, and what is joined to these and seen by fewer than four others. A place is the median depth
+/// of the model, and seen by a photo whose pixel there counts and whose own depth is not less than
+/// 0.85 of its distance. O(photos^2 + photos x pixels).
 std::vector<PixelMask> moving_areas(std::span<const ComparedPhoto> photos);
 
 }  // namespace raysplats

@@ -295,13 +295,15 @@ std::string left_out(std::vector<Json> photos) {
 /// What the run has warned of before its first step.
 std::vector<std::string> told_of_capture(const Json& metrics) {
   std::vector<std::string> out;
-  const auto list = metrics.find("capture_warnings");
-  if (list == metrics.end() || !list->is_array()) return out;
-  for (const Json& each : *list) {
-    if (!each.is_string() || each.get_ref<const std::string&>().empty()) continue;
-    out.push_back(each.get<std::string>());
-    char& first = out.back().front();
-    first = static_cast<char>(std::toupper(static_cast<unsigned char>(first)));
+  for (const char* key : {"photo_warnings", "camera_warnings"}) {
+    const auto list = metrics.find(key);
+    if (list == metrics.end() || !list->is_array()) continue;
+    for (const Json& each : *list) {
+      if (!each.is_string() || each.get_ref<const std::string&>().empty()) continue;
+      out.push_back(each.get<std::string>());
+      char& first = out.back().front();
+      first = static_cast<char>(std::toupper(static_cast<unsigned char>(first)));
+    }
   }
   return out;
 }

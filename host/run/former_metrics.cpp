@@ -96,7 +96,7 @@ double former_number(const Json& former, const char* key) {
 }
 
 std::vector<std::string> former_warnings(const Json& former) {
-  return texts(former, "capture_warnings");
+  return texts(former, "photo_warnings");
 }
 
 std::map<std::string, Json> former_photos(const Json& former) {

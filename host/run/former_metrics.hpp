@@ -21,7 +21,7 @@ nlohmann::json continued_metrics(nlohmann::json now, const nlohmann::json& forme
 /// The facts about each training photo, by its name.
 std::map<std::string, nlohmann::json> former_photos(const nlohmann::json& former);
 
-/// What a run has warned of in its capture.
+/// What a run has warned of in its photos.
 std::vector<std::string> former_warnings(const nlohmann::json& former);
 
 /// A number of it; 0 where it is unknown.

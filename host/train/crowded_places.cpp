@@ -29,26 +29,26 @@ bool from_one_place(const Camera& a, const Camera& b, double distance) {
 }
 
 CrowdedPlaces crowded_places(std::span<const Camera> cameras, std::span<const double> distances) {
-  std::vector<std::vector<std::size_t>> places;
+  std::vector<CrowdedPlace> places;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const auto holds = [&](const std::vector<std::size_t>& place) {
-      const std::size_t first = place.front();
-      return from_one_place(cameras[first], cameras[i], distances[first]);
+    const auto holds = [&](const CrowdedPlace& place) {
+      return from_one_place(cameras[place.photos.front()], cameras[i], place.distance);
     };
     const auto found = std::find_if(places.begin(), places.end(), holds);
     if (found != places.end()) {
-      found->push_back(i);
+      found->photos.push_back(i);
     } else {
-      places.push_back({i});
+      places.push_back({{i}, distances[i]});
     }
   }
   CrowdedPlaces out;
   if (places.empty()) return out;
   std::vector<double> sizes;
   sizes.reserve(places.size());
-  for (const auto& place : places) sizes.push_back(static_cast<double>(place.size()));
+  for (const CrowdedPlace& place : places)
+    sizes.push_back(static_cast<double>(place.photos.size()));
   out.most = static_cast<std::size_t>(std::ceil(kTimesMedian * median(std::move(sizes))));
-  std::erase_if(places, [&](const auto& place) { return place.size() <= out.most; });
+  std::erase_if(places, [&](const CrowdedPlace& place) { return place.photos.size() <= out.most; });
   out.places = std::move(places);
   return out;
 }

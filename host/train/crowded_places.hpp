@@ -10,8 +10,13 @@
 namespace raysplats {
 
 /// Where far more photos were taken than elsewhere, as where a video stands still.
+struct CrowdedPlace {
+  std::vector<std::size_t> photos;  ///< positions, ascending
+  double distance = 0;              ///< to what the first one sees
+};
+
 struct CrowdedPlaces {
-  std::vector<std::vector<std::size_t>> places;  ///< positions of their photos, ascending
+  std::vector<CrowdedPlace> places;
   std::size_t most = 0;  ///< photos that a place is worth; each of these has more
 };
 

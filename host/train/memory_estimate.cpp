@@ -150,6 +150,11 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
   // Depth, its gradient, and a map that found no room. Lists of sparse points are small.
   if (options.depth_weight > 0)
     out.images += demand.pixels * (4 + (demand.depth_maps > 0 ? 1 : 0)) * sizeof(float);
+  // A tracer that looks for what moves, and the photo without that.
+  if (options.leave_out_moving) {
+    if (packets) out.tracing += demand.gaussians * record;
+    out.images += demand.pixels * (photo + sizeof(float));
+  }
   if (packets) out.hits = packet_bytes(options, demand, device);
   // Moments of all parameters lie in one buffer.
   std::size_t largest = std::max({floats * sizeof(float), sizeof(RsLine), packets ? exact : 0});

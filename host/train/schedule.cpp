@@ -329,8 +329,8 @@ ViewOrder::Part ViewOrder::part_of(std::int64_t from,
                                    std::vector<std::size_t> views) const {
   Part out{from, stream, std::move(views), 0};
   out.size = out.views.size();
-  for (const std::vector<std::size_t>& place : crowded_.places) {
-    const std::size_t here = in_both(out.views, place).size();
+  for (const CrowdedPlace& place : crowded_.places) {
+    const std::size_t here = in_both(out.views, place.photos).size();
     out.size -= here - std::min(here, crowded_.most);
   }
   return out;
@@ -339,8 +339,8 @@ ViewOrder::Part ViewOrder::part_of(std::int64_t from,
 // The views of a pass, ascending.
 std::vector<std::size_t> ViewOrder::drawn(const Part& part, CounterRng& rng) const {
   std::vector<std::size_t> out = part.views;
-  for (const std::vector<std::size_t>& place : crowded_.places) {
-    std::vector<std::size_t> spare = in_both(part.views, place);
+  for (const CrowdedPlace& place : crowded_.places) {
+    std::vector<std::size_t> spare = in_both(part.views, place.photos);
     for (std::size_t i = 0; i < std::min(crowded_.most, spare.size()); ++i)
       std::swap(spare[i], spare[i + rng.below(spare.size() - i)]);
     spare.erase(spare.begin(),

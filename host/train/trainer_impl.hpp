@@ -127,7 +127,6 @@ struct Trainer::Impl {
   MemoryDemand demand(std::size_t count) const;
   void check_room(std::size_t count, std::size_t most) const;
   void choose_background();
-  void warn(std::string of_capture);
   void warn_of_photos();
   void choose_color_range();
   void reset_exposure();
@@ -175,6 +174,7 @@ struct Trainer::Impl {
   // trainer_validation.cpp: training views that judge the run.
   std::int64_t join_iteration() const;
   std::size_t loss_views() const;
+  std::size_t pass_views() const;
   void restore_joined_views(const Checkpoint& checkpoint);
   bool validation_due() const;
   bool is_validated() const;
@@ -327,10 +327,11 @@ struct Trainer::Impl {
   std::deque<SentStep> sent;         // the oldest first
   bool await_sizes = false;          // of the next step: its view had too little room
   bool cap_reported = false;
-  std::int64_t timed_steps = 0;                  // whose kernels were timed
-  std::uint64_t skipped_before = 0;              // updates of Adam, before resume()
-  std::optional<TrainOptions> resumed;           // options of the run that resume() has brought
-  std::vector<std::string> capture_warnings;     // that the run has given
+  std::int64_t timed_steps = 0;         // whose kernels were timed
+  std::uint64_t skipped_before = 0;     // updates of Adam, before resume()
+  std::optional<TrainOptions> resumed;  // options of the run that resume() has brought
+  // What the run has warned of: by its photos, once, and by its cameras, at each start.
+  std::vector<std::string> photo_warnings, camera_warnings;
   std::shared_ptr<const nlohmann::json> former;  // metrics.json before this object's first start()
   PsnrRise rise;
   RunClock clock{Stopwatch(context), Stopwatch(context)};

@@ -245,9 +245,10 @@ TrainSummary Trainer::Impl::train(bool show_progress) {
     spdlog::warn(
         "the last PSNR of the test views, {:.2f} dB, is below that of iteration {}, {:.2f} dB: the "
         "run learns its photos by heart, its rates are too high, or something moves in the photos, "
-        "which masks and --leave-out-moving can leave out",
+        "which masks{} can leave out",
         judged_psnr(run.evaluations().back(), options.exposure), best->iteration,
-        judged_psnr(*best, options.exposure));
+        judged_psnr(*best, options.exposure),
+        options.leave_out_moving || !options.mirrors.empty() ? "" : " or --leave-out-moving");
   }
   if (!over && !asked.stop) {
     throw Error(

@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // What moves or changes from photo to photo, as people and cars. A model that is trained on it
 // shows it as haze and ghosts.
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 #include <utility>
 
 #include "eval/moving_areas.hpp"
 #include "train/schedule.hpp"
-#include "train/step_options.hpp"
 #include "train/trainer_impl.hpp"
 
 namespace raysplats {
@@ -65,6 +62,7 @@ std::vector<PixelMask> masks_of(std::span<const float> numbers, std::size_t phot
   std::vector<PixelMask> out(photos);
   for (PixelMask& mask : out) {
     const auto width = static_cast<int>(next(kSide)), height = static_cast<int>(next(kSide));
+    if ((width == 0) != (height == 0)) refuse();
     mask = PixelMask(width, height);
     for (std::uint32_t& word : mask.words) {
       word = next(kHalf);

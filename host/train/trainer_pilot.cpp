@@ -86,7 +86,7 @@ void Trainer::Impl::check_not_begun(const char* function) const {
 void Trainer::Impl::apply_options() {
   TrainOptions centred = options;
   centred.bounds = about_origin(options.bounds, dataset.origin);
-  density.follow(centred, loss_views());
+  density.follow(centred, pass_views());
   order_views();
 }
 

@@ -54,13 +54,15 @@ nlohmann::json Trainer::Impl::photo_report() const {
       }
     }
     const bool is_left_out = std::binary_search(left_out.begin(), left_out.end(), i);
-    if (is_left_out) photo["name"] = train_cameras[i].name;  // which this part may not have read
+    const double moved = marked_share(moving[i]);
+    if (is_left_out || moved > 0)
+      photo["name"] = train_cameras[i].name;  // which this part may not have read
     if (photo.is_null()) continue;
     if (std::isfinite(psnr[i])) photo["psnr"] = std::min(psnr[i], kMostPsnr);
     photo.erase("left_out_from");
     if (is_left_out) photo["left_out_from"] = left_out_from;
     photo.erase("moving");
-    if (const double share = marked_share(moving[i]); share > 0) photo["moving"] = share;
+    if (moved > 0) photo["moving"] = moved;
     out.push_back(std::move(photo));
   }
   return out;
@@ -275,7 +277,8 @@ void Trainer::Impl::write_metrics(bool complete) {
                      {"peak_device_bytes", context.peak_allocated_bytes()},
                      {"device", device.name},
                      {"driver", fmt::format("{}, {}", device.platform, device.driver_version)},
-                     {"capture_warnings", capture_warnings},
+                     {"photo_warnings", photo_warnings},
+                     {"camera_warnings", camera_warnings},
                      {"photos", photo_report()},
                      {"timed_steps", timed_steps},
                      {"kernels", kernels_of(context)}};

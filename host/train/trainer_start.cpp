@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <set>
 #include <utility>
 
 #include "io/dataset/dataset_photos.hpp"
@@ -59,10 +60,11 @@ void note_many_passes(const TrainOptions& options, std::size_t photos) {
 // `order`: of the run's views, a copy that moves on.
 void note_unseen(const TrainOptions& options, std::size_t photos, ViewOrder order) {
   const std::int64_t views = last_iteration(options) * options.views_per_step;
-  if (views >= static_cast<std::int64_t>(photos)) return;
-  std::vector<bool> seen(photos);
-  for (std::int64_t turn = 0; turn < views; ++turn) seen[order.at(turn)] = true;
-  const auto unseen = static_cast<std::size_t>(std::count(seen.begin(), seen.end(), false));
+  std::set<std::size_t> seen;
+  for (std::int64_t turn = 0; turn < views && seen.size() < photos; ++turn)
+    seen.insert(order.at(turn));
+  const std::size_t unseen = photos - seen.size();
+  if (unseen == 0) return;
   spdlog::info("within {} the run never looks at {} of the {} training photos",
                counted(last_iteration(options), "iteration"), unseen, photos);
 }
@@ -247,13 +249,12 @@ void Trainer::Impl::require_depth_gradients() const {
 }
 
 // What photos that were read for the start tell of faults of the capture: as many as there are.
-void Trainer::Impl::warn(std::string of_capture) {
-  if (of_capture.empty()) return;
-  spdlog::warn("{}", of_capture);
-  capture_warnings.push_back(std::move(of_capture));
-}
-
 void Trainer::Impl::warn_of_photos() {
+  const auto warn = [this](std::string warning) {
+    if (warning.empty()) return;
+    spdlog::warn("{}", warning);
+    photo_warnings.push_back(std::move(warning));
+  };
   if (small_photos.empty()) photos(PhotoChoice::kSome);
   const auto& [count, read] = *small_photos.rbegin();
   const std::vector<std::size_t> all = first_views();
@@ -312,10 +313,7 @@ void Trainer::Impl::load_former_metrics() {
   if (former) return;
   former = run.former_metrics();
   clock.evaluating.set(former_number(*former, "evaluation_seconds"));
-  for (std::string& warning : former_warnings(*former)) {
-    if (std::ranges::find(capture_warnings, warning) == capture_warnings.end())
-      capture_warnings.push_back(std::move(warning));
-  }
+  if (photo_warnings.empty()) photo_warnings = former_warnings(*former);
   const TrainOptions& before = resumed ? *resumed : options;
   for (const TrainRow& row : run.former_rows()) {
     last_loss = row.loss;
@@ -339,15 +337,16 @@ void Trainer::Impl::start() {
     if (ranks.leads()) warn_of_photos();
   }
   small_photos.clear();
-  warn(strays_warning(train_cameras));
   if (train_views.size() < kFewViews) {
     spdlog::warn("{} of {}: depth is open, and other views will look wrong",
                  counted(train_views.size(), "training view"), dataset.root.string());
   }
   const std::vector<Camera> held_out = cameras_of(dataset, test_views);
-  warn(direction_warning(dataset, held_out, train_cameras));
-  warn(crowds_warning(crowded, train_cameras,
-                      subject_distances(train_cameras, dataset.points, extent), held_out));
+  camera_warnings = {strays_warning(train_cameras),
+                     direction_warning(dataset, held_out, train_cameras),
+                     crowds_warning(crowded, train_cameras, held_out)};
+  std::erase(camera_warnings, "");
+  for (const std::string& warning : camera_warnings) spdlog::warn("{}", warning);
   note_many_passes(options, train_views.size());
   note_unseen(options, train_views.size(), order);
   warn_of_late("eval-at", options.eval_at, options);

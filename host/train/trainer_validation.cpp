@@ -40,6 +40,19 @@ std::size_t Trainer::Impl::loss_views() const {
   return joined ? train_views.size() : train_views.size() - apart.size();
 }
 
+// Of these, as many as a pass has.
+std::size_t Trainer::Impl::pass_views() const {
+  std::size_t out = loss_views();
+  for (const CrowdedPlace& place : crowded.places) {
+    const auto waits = std::ranges::count_if(place.photos, [this](std::size_t view) {
+      return !joined && std::ranges::binary_search(apart, view);
+    });
+    const std::size_t here = place.photos.size() - static_cast<std::size_t>(waits);
+    out -= here - std::min(here, crowded.most);
+  }
+  return out;
+}
+
 // A model that was trained on the views knows them: in a run that goes on for longer than it was
 // to, they cannot judge again.
 void Trainer::Impl::restore_joined_views(const Checkpoint& checkpoint) {

@@ -146,18 +146,15 @@ std::string marks_warning(const Dataset& dataset,
 
 std::string crowds_warning(const CrowdedPlaces& crowded,
                            std::span<const Camera> trained,
-                           std::span<const double> distances,
                            std::span<const Camera> held_out) {
   if (crowded.places.empty()) return "";
-  std::size_t photos = 0, copies = 0;
-  for (const auto& place : crowded.places) {
-    photos += place.size();
-    const std::size_t first = place.front();
-    copies += static_cast<std::size_t>(
-        std::count_if(held_out.begin(), held_out.end(), [&](const Camera& camera) {
-          return from_one_place(trained[first], camera, distances[first]);
-        }));
-  }
+  std::size_t photos = 0;
+  for (const CrowdedPlace& place : crowded.places) photos += place.photos.size();
+  const auto copies = std::ranges::count_if(held_out, [&](const Camera& camera) {
+    return std::ranges::any_of(crowded.places, [&](const CrowdedPlace& place) {
+      return from_one_place(trained[place.photos.front()], camera, place.distance);
+    });
+  });
   return fmt::format(
       "{} of {} training photos are from {}, as where a video stands still: together they are "
       "drawn as often as {} others (--no-even-places draws each as often as any){}",

@@ -42,10 +42,9 @@ std::string marks_warning(const Dataset& dataset,
                           std::span<const SmallPhoto> read,
                           std::span<const std::size_t> views);
 
-/// Places with far more photos than others. `distances`: to what the trained cameras see.
+/// Places with far more photos than others; `crowded` by positions in `trained`.
 std::string crowds_warning(const CrowdedPlaces& crowded,
                            std::span<const Camera> trained,
-                           std::span<const double> distances,
                            std::span<const Camera> held_out);
 
 }  // namespace raysplats

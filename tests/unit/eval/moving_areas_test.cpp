@@ -9,7 +9,7 @@
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
-#include <numbers>
+#include <limits>
 #include <vector>
 
 #include "scene/camera/camera_model.hpp"
@@ -111,9 +111,13 @@ TEST_CASE("a thing before a tenth of a photo has the error that it is, and all e
   for (std::size_t i = 0; i < kPixels; ++i) {
     if (thing.holds(i)) photo[3 * kPixels + i] = 0.0f;
   }
-  for (const float each : fitted_error(picture, photo, kWidth, kHeight)) CHECK(each < 1e-4f);
+  const std::vector<float> rest = fitted_error(picture, photo, kWidth, kHeight);
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    CHECK(std::isnan(rest[i]) == thing.holds(i));
+    if (!thing.holds(i)) CHECK(rest[i] < 1e-4f);
+  }
   std::fill(photo.begin() + 3 * kPixels, photo.end(), 0.0f);
-  for (const float each : fitted_error(picture, photo, kWidth, kHeight)) CHECK(each == 0.0f);
+  for (const float each : fitted_error(picture, photo, kWidth, kHeight)) CHECK(std::isnan(each));
 }
 
 TEST_CASE("what one photo shows and others do not moves; what all lack does not") {
@@ -158,6 +162,38 @@ TEST_CASE("what a model has before one camera alone is its fault, not the photo'
     if (floater.holds(i)) photos[3].depth[i] = 2.0f;  // others look through it
   }
   for (const PixelMask& mask : moving_areas(photos)) CHECK(count(mask) == 0);
+}
+
+TEST_CASE("photos that do not count at a place say nothing of it") {
+  const float unknown = std::numeric_limits<float>::quiet_NaN();
+  std::vector<ComparedPhoto> photos = wall_photos(12);
+  for (std::size_t i = 0; i < photos.size(); ++i)
+    add_error(photos[i], about(photos[i].camera, 0, 0, 14), i == 5 ? 0.3f : unknown);
+  for (const PixelMask& mask : moving_areas(photos)) CHECK(count(mask) == 0);
+  // What errors usually are does not depend on how much of the photos counts.
+  photos = wall_photos(12);
+  for (ComparedPhoto& photo : photos) {
+    for (std::size_t i = 0; i < kPixels; ++i)
+      photo.error[i] = i % kWidth < kWidth / 2 ? 0.06f : unknown;
+  }
+  add_error(photos[2], {5, 5, 12}, 0.3f);
+  for (const PixelMask& mask : moving_areas(photos)) CHECK(count(mask) == 0);
+}
+
+TEST_CASE("what passes before the sky is found wherever cameras are turned") {
+  std::vector<ComparedPhoto> photos;
+  for (int i = 0; i < 9; ++i) {
+    const double turn = 0.17 * (i - 4);
+    const Camera camera = look_at({0.1 * i, 0, 0}, {0.1 * i + std::sin(turn), 0, std::cos(turn)},
+                                  {0, -1, 0}, kWidth, kHeight, 0.5 * kWidth);
+    photos.push_back({camera, std::vector<float>(kPixels), std::vector<float>(kPixels)});
+    // Something below the sky, so that there is a depth.
+    std::fill(photos.back().depth.begin() + kPixels / 2, photos.back().depth.end(), 5.0f);
+  }
+  add_error(photos[4], {2, 4, 8}, 0.3f);
+  add_error(photos[4], {30, 4, 8}, 0.3f);
+  const std::vector<PixelMask> found = moving_areas(photos);
+  for (std::size_t i = 0; i < photos.size(); ++i) CHECK(count(found[i]) == (i == 4 ? 200 : 0));
 }
 
 TEST_CASE("nothing moves where few photos see the place, nor among none") {

@@ -149,17 +149,18 @@ TEST_CASE("a run names the photos that it left out, which are no odd ones of its
 TEST_CASE("a run warns of what it has found in its capture before its first step") {
   const Run run;
   const auto page_of = [&](const char* warnings) {
-    run.write(
-        "metrics.json",
-        fmt::format(R"({{"complete":true,"iteration":600,"capture_warnings":{}}})", warnings));
+    run.write("metrics.json", fmt::format(R"({{"complete":true,"iteration":600,"photo_warnings":{},
+      "camera_warnings":["all others stand there"]}})",
+                                          warnings));
     return run_report(run.path());
   };
   const std::string page = page_of(R"(["something stands <still>","2 of 9 are grey"])");
   CHECK(contains(page, "Something stands &lt;still&gt;."));
   CHECK(contains(page, "2 of 9 are grey."));
-  CHECK(contains(page, "2 warnings"));
+  CHECK(contains(page, "All others stand there."));
+  CHECK(contains(page, "3 warnings"));
   for (const char* damaged : {"[]", "[1,null,\"\",{}]", "{}", "7", "\"text\""})
-    CHECK(contains(page_of(damaged), "nothing to warn of"));
+    CHECK(contains(page_of(damaged), "1 warning"));
 }
 
 TEST_CASE("a run whose held-out photos fit where they are shifted names --poses") {

@@ -74,7 +74,8 @@ TEST_CASE("a place where a camera stands still is crowded, and no other") {
   const CrowdedPlaces found = crowded(cameras);
   CHECK(found.most == 4);
   REQUIRE(found.places.size() == 1);
-  CHECK(found.places.front() == still);
+  CHECK(found.places.front().photos == still);
+  CHECK(found.places.front().distance == 5);
   // Where every place has as many, none has more than others.
   std::vector<Camera> slow;
   for (const Camera& camera : ring(10)) slow.insert(slow.end(), 24, camera);
@@ -84,7 +85,7 @@ TEST_CASE("a place where a camera stands still is crowded, and no other") {
 
 TEST_CASE("a pass draws as many photos of a crowded place as it is worth, others each time") {
   CrowdedPlaces crowd{{{}}, 4};
-  for (std::size_t i = 10; i < 30; ++i) crowd.places.front().push_back(i);
+  for (std::size_t i = 10; i < 30; ++i) crowd.places.front().photos.push_back(i);
   ViewOrder order(1, 30, {}, 0, crowd);
   std::vector<int> seen(30);
   constexpr int kPasses = 50, kPass = 14;
@@ -124,10 +125,12 @@ TEST_CASE("a run on photos of a camera that stands still says so, and again when
   options.init = "random";
   options.checkpoint_every = 3;
   const auto warnings_of = [](const std::filesystem::path& run) {
-    return nlohmann::json::parse(std::ifstream(run / "metrics.json")).at("capture_warnings");
+    return nlohmann::json::parse(std::ifstream(run / "metrics.json")).at("camera_warnings");
   };
   const LogCapture log;
-  Trainer(shared_test_context(), data.dataset, options, data.folder / "run").run(false);
+  Trainer trainer(shared_test_context(), data.dataset, options, data.folder / "run");
+  CHECK(trainer.step(1));  // which starts the run, as run() does
+  trainer.run(false);
   const nlohmann::json told = warnings_of(data.folder / "run");
   REQUIRE(told.size() == 1);
   CHECK(told.front().get<std::string>().starts_with(

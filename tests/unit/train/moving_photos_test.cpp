@@ -183,5 +183,6 @@ TEST_CASE("checkpoints that leave out parts of other photos are refused") {
   damaged([](std::vector<float>& numbers) { numbers.pop_back(); });
   damaged([](std::vector<float>& numbers) { numbers.front() = -1; });
   damaged([](std::vector<float>& numbers) { numbers.front() = 1e9f; });
+  damaged([](std::vector<float>& numbers) { numbers.insert(numbers.begin(), {9.0f, 0.0f}); });
   damaged([](std::vector<float>& numbers) { numbers.push_back(1); });
 }

@@ -38,7 +38,7 @@ std::vector<View> make_views(const Scratch& scratch, std::size_t count, const st
     for (std::size_t p = 0; p < image.pixels(); p += 4) image.data[4 * p + 3] = 0.0f;
     View& view = views[i];
     view.image_path = scratch / (std::to_string(i) + type);
-    view.sample_bytes = type == ".exr" ? 4 : 1;
+    view.sample_bytes = type == ".exr" ? 4 : type == ".16.png" ? 2 : 1;
     write_image(view.image_path, image);
     view.camera.width = view.source_camera.width = kWidth;
     view.camera.height = view.source_camera.height = kHeight;
@@ -132,7 +132,7 @@ TEST_CASE("a reduced photo is the average over areas, of unrounded sums") {
   }
 }
 
-TEST_CASE("what is left out of a photo counts for nothing, and all else as before") {
+TEST_CASE("what is left out of a photo counts for nothing, and all else as before [small]") {
   const Scratch scratch;
   Context context(test_device());
   Image mask(kWidth, kHeight, 1, 1.0f);
@@ -140,7 +140,7 @@ TEST_CASE("what is left out of a photo counts for nothing, and all else as befor
   write_image(scratch / "mask.png", mask);
   PixelMask moves(9, 5);
   for (const std::size_t i : {0u, 7u, 22u, 23u, 31u, 32u, 44u}) moves.set(i);
-  for (const char* type : {".png", ".exr"}) {
+  for (const char* type : {".png", ".16.png", ".exr"}) {
     for (const bool cut_out : {false, true}) {
       for (const bool weighted : {false, true}) {
         if (weighted && !cut_out) continue;
