@@ -59,7 +59,7 @@ PointCloud foreground_points(std::span<const SmallPhoto> photos,
 
 /// Points of what lies beyond the depths of a sweep, as mountains behind a terrace: what agrees
 /// about a depth around `depths.farthest`, in photos farther apart. As many of `count` as pixels
-/// agree there, of those that agree there or in `depths`. None where 4 % of the pixels or fewer do.
+/// agree there, of those that agree there or in `depths`. None where 8 % of the pixels or fewer do.
 PointCloud background_points(std::span<const SmallPhoto> photos,
                              const DepthRange& depths,
                              std::size_t count,
