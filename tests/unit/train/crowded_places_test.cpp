@@ -128,9 +128,11 @@ TEST_CASE("a run on photos of a camera that stands still says so, and again when
     return nlohmann::json::parse(std::ifstream(run / "metrics.json")).at("camera_warnings");
   };
   const LogCapture log;
-  Trainer trainer(shared_test_context(), data.dataset, options, data.folder / "run");
-  CHECK(trainer.step(1));  // which starts the run, as run() does
-  trainer.run(false);
+  {
+    Trainer trainer(shared_test_context(), data.dataset, options, data.folder / "run");
+    CHECK(trainer.step(1));  // which starts the run, as run() does
+    trainer.run(false);
+  }
   const nlohmann::json told = warnings_of(data.folder / "run");
   REQUIRE(told.size() == 1);
   CHECK(told.front().get<std::string>().starts_with(
