@@ -192,6 +192,8 @@ struct Trainer::Impl {
   // trainer_moving.cpp: what moves or changes from photo to photo.
   std::vector<PixelMask> moving_views();
   void set_moving(std::vector<PixelMask> found);
+  std::int64_t last_look() const;
+  void warn_of_late_look() const;
   void leave_out_moving_areas();
   void store_moving(CheckpointSections& sections) const;
   void restore_moving(const Checkpoint& checkpoint);

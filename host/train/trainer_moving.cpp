@@ -113,6 +113,21 @@ void Trainer::Impl::set_moving(std::vector<PixelMask> found) {
   moving = std::move(found);
 }
 
+// Completed iterations after which it is looked for the last time.
+std::int64_t Trainer::Impl::last_look() const {
+  const double share = moving_shares(options, loss_views()).back();
+  return std::llround(share * static_cast<double>(options.iterations));
+}
+
+void Trainer::Impl::warn_of_late_look() const {
+  if (!resumed || resumed->leave_out_moving || !options.leave_out_moving) return;
+  if (iteration <= last_look()) return;
+  spdlog::warn(
+      "leave-out-moving comes too late: what moves is looked for until iteration {}, and this run "
+      "goes on from {}; resume from an earlier checkpoint",
+      last_look(), iteration);
+}
+
 // All ranks do what the first one finds.
 void Trainer::Impl::leave_out_moving_areas() {
   finish_steps();
@@ -132,8 +147,7 @@ void Trainer::Impl::leave_out_moving_areas() {
     share += marked_share(mask) / static_cast<double>(moving.size());
     photos += mask.width > 0 ? 1 : 0;
   }
-  const double last_share = moving_shares(options, loss_views()).back();
-  const bool last = iteration >= std::llround(last_share * static_cast<double>(options.iterations));
+  const bool last = iteration >= last_look();
   spdlog::log(last ? spdlog::level::info : spdlog::level::debug,
               "iteration {}: {:.1f} % of the training photos, in {} of {}, show what moves or "
               "changes, and are left out",

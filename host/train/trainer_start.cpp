@@ -352,6 +352,7 @@ void Trainer::Impl::start() {
   warn_of_late("eval-at", options.eval_at, options);
   warn_of_late("save-at", options.save_at, options);
   warn_of_idle_options(options);
+  warn_of_late_look();
   if (options.scale_activation == ScaleActivation::kSigmoid && extent > kSigmoidExtent) {
     spdlog::warn(
         "scale-activation = sigmoid keeps every axis below one unit of the data set, {:.2g} of the "

@@ -22,6 +22,7 @@
 #include "raysplats/trainer.hpp"
 #include "run/checkpoint.hpp"
 #include "unit/fixture.hpp"
+#include "unit/log_capture.hpp"
 #include "unit/train/photographed.hpp"
 #include "unit/train/short_training.hpp"
 #include "util/rng.hpp"
@@ -142,6 +143,14 @@ TEST_CASE("a run that is resumed leaves out what it would have, bit for bit") {
   kept.run(false);
   CHECK(share_left_out(data.folder / "kept") == 0);
   CHECK(straight.model().means != kept.model().means);
+  // Told to leave it out when it is no longer looked for, it says so.
+  options.leave_out_moving = true;
+  options.iterations = 420;
+  Trainer late(shared_test_context(), data.dataset, options, data.folder / "late");
+  late.resume(checkpoint_path(data.folder / "kept", 400));
+  const LogCapture log;
+  late.run(false);
+  CHECK(log.contains("leave-out-moving comes too late"));
 }
 
 TEST_CASE("ranks leave out the same as one does, and train the same model") {
