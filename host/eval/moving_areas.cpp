@@ -2,21 +2,20 @@
 #include "eval/moving_areas.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/mat4x4.hpp>
-#include <glm/matrix.hpp>
 #include <glm/vec3.hpp>
-#include <glm/vec4.hpp>
 #include <iterator>
 #include <limits>
 #include <optional>
 
+#include "eval/metrics.hpp"
 #include "eval/photo_agreement.hpp"
 #include "scene/camera/camera_model.hpp"
 #include "scene/camera/view_axes.hpp"
+#include "scene/even_choice.hpp"
 #include "scene/image/pixel_count.hpp"
 #include "scene/statistics.hpp"
 #include "util/parallel.hpp"
@@ -26,7 +25,6 @@ namespace {
 
 constexpr int kFits = 4;                // of the colours
 constexpr double kLeastError = 0.03;    // below which pixels of a fit weigh the same
-constexpr double kDamping = 1e-6;       // of a fit, beside a pixel's weight of 1
 constexpr double kFar = 0.05;           // an error
 constexpr double kVeryFar = 0.12;       // and one that others are joined to
 constexpr double kTimesMedian = 3;      // of all errors: far; twice as much: very far
@@ -52,48 +50,25 @@ void for_neighbours(Size size, std::size_t pixel, const Visit& visit) {
   }
 }
 
-using Planes = std::array<std::vector<double>, 3>;  // R, G, B
+glm::dvec3 color_of(const Image& image, std::size_t pixel) {
+  return {image.data[3 * pixel], image.data[3 * pixel + 1], image.data[3 * pixel + 2]};
+}
 
 // The picture with its colours as near to the photo's as an affine map brings them.
-Planes fitted(std::span<const float> picture, std::span<const float> photo, std::size_t pixels) {
-  Planes out;
-  for (std::size_t c = 0; c < 3; ++c)
-    out[c].assign(picture.begin() + static_cast<std::ptrdiff_t>(c * pixels),
-                  picture.begin() + static_cast<std::ptrdiff_t>((c + 1) * pixels));
+Image fitted(const Image& picture, const Image& photo, const Image& weight) {
+  Image out = picture, kept = weight;
   for (int fit = 0; fit < kFits; ++fit) {
-    glm::dmat4 normal(0.0);
-    std::array<glm::dvec4, 3> right{};
-    for (std::size_t i = 0; i < pixels; ++i) {
-      double error = 0;
-      for (std::size_t c = 0; c < 3; ++c)
-        error = std::max(error, std::abs(out[c][i] - static_cast<double>(photo[c * pixels + i])));
-      const double weight =
-          static_cast<double>(photo[3 * pixels + i]) / std::max(error, kLeastError);
-      const glm::dvec4 own(picture[i], picture[pixels + i], picture[2 * pixels + i], 1.0);
-      normal += weight * glm::outerProduct(own, own);
-      for (std::size_t c = 0; c < 3; ++c)
-        right[c] += weight * static_cast<double>(photo[c * pixels + i]) * own;
+    for (std::size_t i = 0; i < photo.pixels(); ++i) {
+      const glm::dvec3 miss = glm::abs(color_of(out, i) - color_of(photo, i));
+      kept.data[i] =
+          weight.data[i] / static_cast<float>(std::max({miss.x, miss.y, miss.z, kLeastError}));
     }
-    // Colours that tell nothing of a number of the map leave it as it is.
-    const double damping = kDamping * (1.0 + normal[3][3]);
-    for (std::size_t c = 0; c < 3; ++c) {
-      glm::dvec4 same(0.0);
-      same[static_cast<glm::length_t>(c)] = 1.0;
-      const glm::dvec4 map =
-          glm::inverse(normal + glm::dmat4(damping)) * (right[c] + damping * same);
-      for (std::size_t i = 0; i < pixels; ++i)
-        out[c][i] = glm::dot(
-            map, glm::dvec4(picture[i], picture[pixels + i], picture[2 * pixels + i], 1.0));
-    }
+    out = color_corrected(picture, photo, kept);
   }
   return out;
 }
 
 Size size_of(const ComparedPhoto& photo) { return {photo.camera.width, photo.camera.height}; }
-
-bool is_along_ray(CameraModel model) {
-  return model == CameraModel::kFisheye || model == CameraModel::kEquirectangular;
-}
 
 // Where what a pixel of the model shows is.
 std::optional<glm::dvec3> place_of(const ComparedPhoto& photo, std::size_t pixel, double sky) {
@@ -104,13 +79,8 @@ std::optional<glm::dvec3> place_of(const ComparedPhoto& photo, std::size_t pixel
   const auto depth = static_cast<double>(photo.depth[pixel]);
   if (!(depth > 0)) return ray.origin + sky * ray.direction;
   const double along =
-      is_along_ray(photo.camera.model) ? 1.0 : glm::dot(ray.direction, view_axis(photo.camera));
+      counts_along_ray(photo.camera) ? 1.0 : glm::dot(ray.direction, view_axis(photo.camera));
   return ray.origin + depth / along * ray.direction;
-}
-
-double depth_in(const Camera& camera, const glm::dvec3& place) {
-  if (is_along_ray(camera.model)) return glm::distance(place, camera.center());
-  return (camera.rotation * place + camera.translation).z;
 }
 
 // The error of a photo where it sees a place; nothing where it does not.
@@ -123,7 +93,7 @@ std::optional<double> error_at(const ComparedPhoto& photo, const glm::dvec3& pla
                      static_cast<std::size_t>(x);
   const bool shows = photo.depth[pixel] > 0;
   const double own =
-      shows ? depth_in(photo.camera, place) : glm::distance(place, photo.camera.center());
+      shows ? depth_of(photo.camera, place) : glm::distance(place, photo.camera.center());
   const double depth = shows ? static_cast<double>(photo.depth[pixel]) : sky;
   if (std::isnan(photo.error[pixel]) || depth < kHidden * own) return std::nullopt;
   if (depth * kHidden > own) return std::numeric_limits<double>::infinity();
@@ -132,12 +102,10 @@ std::optional<double> error_at(const ComparedPhoto& photo, const glm::dvec3& pla
 
 // Photos that see much of what one does, from near and far.
 std::vector<std::size_t> witnesses_of(std::span<const PlacedPhoto> placed, std::size_t photo) {
-  std::vector<std::size_t> all = photos_beside(placed, photo, kSameWay, placed.size(),
-                                               std::numeric_limits<double>::infinity());
-  if (all.size() <= kWitnesses) return all;
-  std::vector<std::size_t> out(kWitnesses);
-  for (std::size_t i = 0; i < out.size(); ++i)
-    out[i] = all[(2 * i + 1) * all.size() / (2 * out.size())];
+  const std::vector<std::size_t> all = photos_beside(placed, photo, kSameWay, placed.size(),
+                                                     std::numeric_limits<double>::infinity());
+  std::vector<std::size_t> out = even_choice(all.size(), kWitnesses);
+  for (std::size_t& i : out) i = all[i];
   return out;
 }
 
@@ -191,26 +159,19 @@ PixelMask joined(const PixelMask& seeds, const PixelMask& grows) {
 
 }  // namespace
 
-std::vector<float> fitted_error(std::span<const float> picture,
-                                std::span<const float> photo,
-                                int width,
-                                int height) {
-  const std::size_t pixels = pixel_count(width, height);
-  Planes difference = fitted(picture, photo, pixels);
-  for (std::size_t c = 0; c < 3; ++c) {
-    for (std::size_t i = 0; i < pixels; ++i) {
-      difference[c][i] = static_cast<double>(photo[3 * pixels + i]) *
-                         (difference[c][i] - static_cast<double>(photo[c * pixels + i]));
-    }
-  }
-  std::vector<float> out(pixels, std::numeric_limits<float>::quiet_NaN());
-  for (std::size_t i = 0; i < pixels; ++i) {
-    if (!(photo[3 * pixels + i] > 0)) continue;
+std::vector<float> fitted_error(const Image& picture, const Image& photo, const Image& weight) {
+  std::vector<float> out(photo.pixels(), std::numeric_limits<float>::quiet_NaN());
+  const auto counts = [](float each) { return each > 0; };
+  if (std::ranges::none_of(weight.data, counts)) return out;
+  const Image nearest = fitted(picture, photo, weight);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (!counts(weight.data[i])) continue;
     glm::dvec3 sum(0.0);
     double counted = 0;
-    for_neighbours({width, height}, i, [&](std::size_t other) {
-      sum += glm::dvec3(difference[0][other], difference[1][other], difference[2][other]);
-      counted += static_cast<double>(photo[3 * pixels + other]);
+    for_neighbours({photo.width, photo.height}, i, [&](std::size_t other) {
+      const auto own = static_cast<double>(weight.data[other]);
+      sum += own * (color_of(nearest, other) - color_of(photo, other));
+      counted += own;
     });
     out[i] = static_cast<float>(std::sqrt(glm::dot(sum, sum) / 3) / counted);
   }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "raysplats/camera.hpp"
+#include "raysplats/image.hpp"
 #include "scene/image/pixel_mask.hpp"
 
 namespace raysplats {
@@ -19,12 +20,9 @@ struct ComparedPhoto {
 /// How far a picture is from its photo in each pixel: the root mean square over R, G and B of the
 /// mean difference of 3 x 3 pixels, once an affine map has brought the picture's colours as near to
 /// the photo's as it can (least squares whose weights fall with the difference, so that what moves
-/// has little say). `picture`: planar R, G, B; `photo`: the same and how much a pixel counts; not a
-/// number where it does not. `width` x `height` pixels each.
-std::vector<float> fitted_error(std::span<const float> picture,
-                                std::span<const float> photo,
-                                int width,
-                                int height);
+/// has little say). Three channels each, and one of `weight`, by which pixels count; not a number
+/// where they do not. Throws UsageError when sizes differ.
+std::vector<float> fitted_error(const Image& picture, const Image& photo, const Image& weight);
 
 /// Of each photo, what it shows of things that move or change: pixels that are far from the model
 /// although most of up to 16 photos that see the same place are near to it there. A place where all

@@ -115,6 +115,11 @@ void mark_side(std::span<const PlacedPhoto> photos, double limit, std::vector<bo
 
 }  // namespace
 
+Camera compared_camera(const Camera& full) {
+  const int divisor = (std::max(full.width, full.height) + kComparedSide - 1) / kComparedSide;
+  return divisor > 1 ? downscaled(full, divisor) : full;
+}
+
 std::vector<std::size_t> photos_beside(std::span<const PlacedPhoto> photos,
                                        std::size_t photo,
                                        double degrees,

@@ -7,7 +7,16 @@
 #include <span>
 #include <vector>
 
+#include "raysplats/camera.hpp"
+
 namespace raysplats {
+
+/// The longer side, at most, of the pictures in which a model is compared with its photos: what is
+/// wrong with a pose, or moves, is seen in small ones as well, and what a model lacks of a close-up
+/// is not, for that is to be learned.
+constexpr int kComparedSide = 96;
+/// The camera that takes such a picture.
+Camera compared_camera(const Camera& full);
 
 /// How near a model comes to a training photo, and where that was taken.
 struct PlacedPhoto {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "scene/camera/camera_model.hpp"
 #include "scene/options/trace_option_table.hpp"
 #include "trace/ray_tracer.hpp"
 
@@ -35,10 +36,8 @@ TraceOptions of_bare_rays(TraceOptions options) {
 RayNear RayNear::of(const Camera& camera, float near_depth) {
   RayNear out;
   if (!(near_depth > 0.0f)) return out;
-  const bool around =
-      camera.model == CameraModel::kFisheye || camera.model == CameraModel::kEquirectangular;
   out.limited = true;
-  if (around) out.lens = RS_LENS_AROUND;
+  if (counts_along_ray(camera)) out.lens = RS_LENS_AROUND;
   for (int k = 0; k < 3; ++k) {
     out.plane[static_cast<std::size_t>(k)] = static_cast<float>(camera.rotation[k][2]);
   }

@@ -133,7 +133,7 @@ Trainer::Impl::Impl(Context& device,
                                    subject_distances(train_cameras, dataset.points, extent))
                   : CrowdedPlaces()),
       moving(train_views.size()),
-      density(device, options, extent, loss_views()),
+      density(device, options, extent, pass_views()),
       footprint(device,
                 train_cameras,
                 options.footprint,

@@ -18,9 +18,6 @@
 namespace raysplats {
 namespace {
 
-// Pixels of the longer side of a picture at most. What is wrong with a pose is seen in small
-// pictures as well, and what a model lacks of a close-up is not: that is to be learned.
-constexpr int kSide = 96;
 // Of the error of a picture, what no fit of its colours takes off.
 constexpr double kLeastError = 0.01;
 constexpr double kLeastVariance = 1e-8;  // of the colours of a photo
@@ -45,8 +42,7 @@ std::vector<std::size_t> Trainer::Impl::odd_views() {
     if (iteration < join_iteration() && std::binary_search(apart.begin(), apart.end(), view))
       continue;
     const Camera& full = train_cameras[view];
-    const int divisor = (std::max(full.width, full.height) + kSide - 1) / kSide;
-    const Camera camera = divisor > 1 ? downscaled(full, divisor) : full;
+    const Camera camera = compared_camera(full);
     const int width = camera.width, height = camera.height;
     tracer.forward(gaussians, camera, false, ViewSizes::kAwaited);
     const Buffer<float>& shown =

@@ -8,39 +8,37 @@
 #include <utility>
 
 #include "eval/moving_areas.hpp"
+#include "eval/photo_agreement.hpp"
+#include "scene/image/planes.hpp"
 #include "train/schedule.hpp"
 #include "train/trainer_impl.hpp"
 
 namespace raysplats {
 namespace {
 
-// Pixels of the longer side of a picture at most: what a model lacks of a close-up does not move.
-constexpr int kSide = 96;
 constexpr std::uint32_t kHalf = 0xffffu;  // of a word, which a float of a checkpoint holds exactly
 
-Camera small_camera(const Camera& full) {
-  const int divisor = (std::max(full.width, full.height) + kSide - 1) / kSide;
-  return divisor > 1 ? downscaled(full, divisor) : full;
-}
+// The photo's colours and how much each pixel counts, as the loss takes them.
+struct CountedPhoto {
+  Image colors, weight;
+};
 
-// Planar R, G, B and how much a pixel counts.
-std::vector<float> counted_photo(const DevicePhoto& device,
-                                 const Camera& camera,
-                                 bool cut_out,
-                                 const std::array<float, 3>& background) {
+CountedPhoto counted_photo(const DevicePhoto& device,
+                           const Camera& camera,
+                           bool cut_out,
+                           const std::array<float, 3>& background) {
   const io::Photo photo{camera.width, camera.height, device.planes, device.weighted,
                         device.words.download()};
-  const std::size_t pixels = photo.pixels();
-  std::vector<float> out(4 * pixels);
+  CountedPhoto out{Image(photo.width, photo.height, 3), Image(photo.width, photo.height, 1)};
   for (int y = 0; y < photo.height; ++y) {
     for (int x = 0; x < photo.width; ++x) {
-      const auto at = static_cast<std::size_t>(y) * static_cast<std::size_t>(photo.width) +
-                      static_cast<std::size_t>(x);
       const std::array<float, 4> pixel = photo.at(x, y);
-      for (std::size_t c = 0; c < 3; ++c)
-        out[c * pixels + at] =
-            cut_out ? pixel[3] * pixel[c] + (1 - pixel[3]) * background[c] : pixel[c];
-      out[3 * pixels + at] = cut_out ? photo.weight(x, y) : pixel[3];
+      for (int c = 0; c < 3; ++c) {
+        const auto k = static_cast<std::size_t>(c);
+        out.colors.at(x, y, c) =
+            cut_out ? pixel[3] * pixel[k] + (1 - pixel[3]) * background[k] : pixel[k];
+      }
+      out.weight.at(x, y, 0) = cut_out ? photo.weight(x, y) : pixel[3];
     }
   }
   return out;
@@ -61,7 +59,8 @@ std::vector<PixelMask> masks_of(std::span<const float> numbers, std::size_t phot
   };
   std::vector<PixelMask> out(photos);
   for (PixelMask& mask : out) {
-    const auto width = static_cast<int>(next(kSide)), height = static_cast<int>(next(kSide));
+    const auto width = static_cast<int>(next(kComparedSide)),
+               height = static_cast<int>(next(kComparedSide));
     if ((width == 0) != (height == 0)) refuse();
     mask = PixelMask(width, height);
     for (std::uint32_t& word : mask.words) {
@@ -85,16 +84,16 @@ std::vector<PixelMask> Trainer::Impl::moving_views() {
     if (iteration < join_iteration() && std::binary_search(apart.begin(), apart.end(), view))
       continue;
     ComparedPhoto compared;
-    compared.camera = small_camera(poses ? poses->camera(view) : train_cameras[view]);
+    compared.camera = compared_camera(poses ? poses->camera(view) : train_cameras[view]);
     const int width = compared.camera.width, height = compared.camera.height;
     judge.forward(gaussians, compared.camera);
-    const std::vector<float> picture = judge.image().download();
-    const std::vector<float> photo = counted_photo(photo_cache.get_whole(view, width, height),
-                                                   compared.camera, cut_out, background);
-    compared.error = fitted_error(picture, photo, width, height);
+    const CountedPhoto photo = counted_photo(photo_cache.get_whole(view, width, height),
+                                             compared.camera, cut_out, background);
+    const Image picture = interleaved(judge.image().download(), width, height, 3);
+    compared.error = fitted_error(picture, photo.colors, photo.weight);
     const std::vector<float> depths = judge.depth().download();
     const auto pixels = static_cast<std::ptrdiff_t>(compared.error.size());
-    compared.depth.assign(depths.begin() + pixels, depths.begin() + 2 * pixels);
+    compared.depth.assign(depths.begin() + pixels, depths.begin() + 2 * pixels);  // the median
     photos.push_back(std::move(compared));
     views.push_back(view);
   }

@@ -65,18 +65,6 @@ DepthMap read_picture(const std::filesystem::path& path) {
   return out;
 }
 
-// Whether depths are counted along the ray.
-bool counts_along_ray(const Camera& camera) {
-  return camera.model == CameraModel::kFisheye || camera.model == CameraModel::kEquirectangular ||
-         (camera.lens && camera.lens->form == PhotoLens::Form::kFisheye);
-}
-
-// How deep a camera sees a world point.
-double depth_of(const Camera& camera, const glm::dvec3& world) {
-  const glm::dvec3 local = camera.rotation * world + camera.translation;
-  return counts_along_ray(camera) ? glm::length(local) : local.z;
-}
-
 // Refuses a map of another shape than its photo.
 void check_shape(const DepthMap& map, const View& view) {
   const Camera& photo = view.source_camera;

@@ -122,6 +122,16 @@ std::optional<glm::dvec2> undistort(const Distortion& d, const glm::dvec2& targe
 
 }  // namespace
 
+bool counts_along_ray(const Camera& camera) {
+  return camera.model == CameraModel::kFisheye || camera.model == CameraModel::kEquirectangular ||
+         (camera.lens && camera.lens->form == PhotoLens::Form::kFisheye);
+}
+
+double depth_of(const Camera& camera, const glm::dvec3& world) {
+  const glm::dvec3 local = camera.rotation * world + camera.translation;
+  return counts_along_ray(camera) ? glm::length(local) : local.z;
+}
+
 void set_equirectangular(Camera& camera) {
   camera.model = CameraModel::kEquirectangular;
   camera.fx = 0.5 * camera.width;

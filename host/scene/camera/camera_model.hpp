@@ -31,6 +31,12 @@ std::optional<glm::dvec2> project(const Camera& camera, const glm::dvec3& world)
 /// The same where it lies in the picture; nothing elsewhere.
 std::optional<glm::dvec2> project_into(const Camera& camera, const glm::dvec3& world);
 
+/// Whether depths of this camera are counted along the ray (fisheyes and panoramas), not along its
+/// axis.
+bool counts_along_ray(const Camera& camera);
+/// How deep it sees a world point.
+double depth_of(const Camera& camera, const glm::dvec3& world);
+
 /// Makes the camera a panorama with the intrinsics that nerfstudio gives one.
 void set_equirectangular(Camera& camera);
 

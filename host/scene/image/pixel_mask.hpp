@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -27,7 +28,7 @@ struct PixelMask {
 /// How many pixels there are.
 inline std::size_t count(const PixelMask& mask) {
   std::size_t out = 0;
-  for (std::size_t i = 0; i < pixel_count(mask.width, mask.height); ++i) out += mask[i] ? 1 : 0;
+  for (const std::uint32_t word : mask.words) out += static_cast<std::size_t>(std::popcount(word));
   return out;
 }
 

@@ -4,7 +4,6 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <glm/geometric.hpp>
@@ -14,7 +13,6 @@
 
 #include "scene/camera/camera_model.hpp"
 #include "scene/camera/view_axes.hpp"
-#include "scene/image/pixel_count.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;
@@ -80,28 +78,26 @@ Square about(const Camera& camera, double x, double y, int side) {
 
 TEST_CASE("a picture whose colours are an affine map of the photo's has no error") {
   CounterRng rng(3, 0);
-  std::vector<float> picture(3 * kPixels), photo(4 * kPixels, 1.0f);
-  for (float& value : picture) value = static_cast<float>(rng.uniform());
-  for (std::size_t i = 0; i < kPixels; ++i) {
-    const std::array<float, 3> own{picture[i], picture[kPixels + i], picture[2 * kPixels + i]};
-    photo[i] = 0.7f * own[0] + 0.1f * own[2] + 0.05f;
-    photo[kPixels + i] = 0.9f * own[1] - 0.1f * own[0];
-    photo[2 * kPixels + i] = 0.5f * own[2] + 0.2f;
+  Image picture(kWidth, kHeight, 3), photo = picture;
+  for (float& value : picture.data) value = static_cast<float>(rng.uniform());
+  for (std::size_t i = 0; i < 3 * kPixels; i += 3) {
+    const float r = picture.data[i], g = picture.data[i + 1], b = picture.data[i + 2];
+    photo.data[i] = 0.7f * r + 0.1f * b + 0.05f;
+    photo.data[i + 1] = 0.9f * g - 0.1f * r;
+    photo.data[i + 2] = 0.5f * b + 0.2f;
   }
-  for (const float error : fitted_error(picture, photo, kWidth, kHeight)) CHECK(error < 1e-4f);
+  const Image all(kWidth, kHeight, 1, 1.0f);
+  for (const float error : fitted_error(picture, photo, all)) CHECK(error < 1e-4f);
 }
 
 TEST_CASE("a thing before a tenth of a photo has the error that it is, and all else next to none") {
   CounterRng rng(3, 1);
-  std::vector<float> picture(3 * kPixels), photo(4 * kPixels, 1.0f);
-  for (float& value : picture) value = static_cast<float>(0.2 + 0.4 * rng.uniform());
-  std::copy(picture.begin(), picture.end(), photo.begin());
+  Image picture(kWidth, kHeight, 3), weight(kWidth, kHeight, 1, 1.0f);
+  for (float& value : picture.data) value = static_cast<float>(0.2 + 0.4 * rng.uniform());
+  Image photo = picture;
   const Square thing{20, 10, 15};
-  for (std::size_t i = 0; i < kPixels; ++i) {
-    if (!thing.holds(i)) continue;
-    for (std::size_t c = 0; c < 3; ++c) photo[c * kPixels + i] = picture[c * kPixels + i] + 0.3f;
-  }
-  const std::vector<float> error = fitted_error(picture, photo, kWidth, kHeight);
+  for (std::size_t i = 0; i < 3 * kPixels; ++i) photo.data[i] += thing.holds(i / 3) ? 0.3f : 0.0f;
+  const std::vector<float> error = fitted_error(picture, photo, weight);
   const Square inside{21, 11, 13}, beside{19, 9, 17};
   for (std::size_t i = 0; i < kPixels; ++i) {
     if (inside.holds(i)) CHECK(error[i] == doctest::Approx(0.3).epsilon(0.1));
@@ -109,15 +105,15 @@ TEST_CASE("a thing before a tenth of a photo has the error that it is, and all e
   }
   // What does not count has none, and no say.
   for (std::size_t i = 0; i < kPixels; ++i) {
-    if (thing.holds(i)) photo[3 * kPixels + i] = 0.0f;
+    if (thing.holds(i)) weight.data[i] = 0.0f;
   }
-  const std::vector<float> rest = fitted_error(picture, photo, kWidth, kHeight);
+  const std::vector<float> rest = fitted_error(picture, photo, weight);
   for (std::size_t i = 0; i < kPixels; ++i) {
     CHECK(std::isnan(rest[i]) == thing.holds(i));
     if (!thing.holds(i)) CHECK(rest[i] < 1e-4f);
   }
-  std::fill(photo.begin() + 3 * kPixels, photo.end(), 0.0f);
-  for (const float each : fitted_error(picture, photo, kWidth, kHeight)) CHECK(std::isnan(each));
+  const Image none(kWidth, kHeight, 1);
+  for (const float each : fitted_error(picture, photo, none)) CHECK(std::isnan(each));
 }
 
 TEST_CASE("what one photo shows and others do not moves; what all lack does not") {

@@ -3,18 +3,12 @@
 #include <doctest/doctest.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
-#include <string>
 #include <vector>
 
-#include "comm/thread_ranks.hpp"
-#include "raysplats/context.hpp"
 #include "raysplats/dataset.hpp"
 #include "raysplats/error.hpp"
 #include "raysplats/gaussians.hpp"
@@ -24,6 +18,7 @@
 #include "unit/fixture.hpp"
 #include "unit/log_capture.hpp"
 #include "unit/train/photographed.hpp"
+#include "unit/train/same_run.hpp"
 #include "unit/train/short_training.hpp"
 #include "util/rng.hpp"
 
@@ -35,19 +30,10 @@ constexpr int kPhotos = 30;
 constexpr int kSize = 48;
 constexpr int kBox = 16;  // pixels of a side
 
-std::vector<Camera> ring() {
-  std::vector<Camera> out;
-  for (int i = 0; i < kPhotos; ++i) {
-    const double angle = 2 * std::numbers::pi * i / kPhotos;
-    out.push_back(look_at({4 * std::cos(angle), 4 * std::sin(angle), i % 2}, {0, 0, 0}, {0, 0, 1},
-                          kSize, kSize, 52));
-  }
-  return out;
-}
-
 /// Photos all around, before which a box goes in all that are trained on.
 struct Crowded : Photographed {
-  explicit Crowded(bool boxes = true) : Photographed(coloured_cloud(400, 1.0, 8), ring()) {
+  explicit Crowded(bool boxes = true)
+      : Photographed(coloured_cloud(400, 1.0, 8), ring_around_cloud(kPhotos, kSize)) {
     CounterRng rng(5, 2);
     for (const float position : coloured_cloud(400, 1.0, 8).means) {
       dataset.points.positions.push_back(position + static_cast<float>(0.05 * rng.normal()));
@@ -122,27 +108,16 @@ TEST_CASE("photos in which nothing moves are trained on whole, but for little") 
 TEST_CASE("a run that is resumed leaves out what it would have, bit for bit") {
   const Crowded data;
   TrainOptions options = leaving_out(400);
-  options.trace.deterministic = true;
-  options.checkpoint_every = 20;
-  options.keep_checkpoints = 99;
-  Trainer straight(shared_test_context(), data.dataset, options, data.folder / "straight");
-  straight.run(false);
-  for (const int from : {60, 80, 140, 300}) {
-    INFO(from);
-    const std::filesystem::path run = data.folder / std::to_string(from);
-    Trainer resumed(shared_test_context(), data.dataset, options, run);
-    resumed.resume(checkpoint_path(data.folder / "straight", from));
-    resumed.run(false);
-    CHECK(share_left_out(run) == share_left_out(data.folder / "straight"));
-    check_equal(straight.model(), resumed.model());
-  }
+  const Gaussians straight = check_resumed(data, options, {60, 80, 140, 300}, share_left_out);
+  CHECK(share_left_out(data.folder / "straight") > 0);
   // Told to train on it from here on, it does.
   options.leave_out_moving = false;
+  options.checkpoint_every = 100;
   Trainer kept(shared_test_context(), data.dataset, options, data.folder / "kept");
   kept.resume(checkpoint_path(data.folder / "straight", 300));
   kept.run(false);
   CHECK(share_left_out(data.folder / "kept") == 0);
-  CHECK(straight.model().means != kept.model().means);
+  CHECK(straight.means != kept.model().means);
   // Told to leave it out when it is no longer looked for, it says so.
   options.leave_out_moving = true;
   options.iterations = 420;
@@ -155,24 +130,8 @@ TEST_CASE("a run that is resumed leaves out what it would have, bit for bit") {
 
 TEST_CASE("ranks leave out the same as one does, and train the same model") {
   const Crowded data;
-  TrainOptions options = leaving_out(200);
-  options.trace.deterministic = true;
-  options.views_per_step = 2;
-  Context first(test_device()), second(test_device());
-  const std::array<Context*, 2> contexts{&first, &second};
-  Trainer alone(first, data.dataset, options, data.folder / "alone");
-  alone.run(false);
-  std::array<Gaussians, 2> models;
-  run_thread_ranks(2, [&](Communicator& ranks) {
-    const auto rank = static_cast<std::size_t>(ranks.rank());
-    Trainer trainer(*contexts[rank], data.dataset, options, data.folder / std::to_string(rank),
-                    false, &ranks);
-    trainer.run(false);
-    models[rank] = trainer.model();
-  });
-  CHECK(share_left_out(data.folder / "0") == share_left_out(data.folder / "alone"));
-  CHECK(share_left_out(data.folder / "0") > 0);
-  for (const Gaussians& model : models) check_equal(alone.model(), model);
+  check_ranks(data, leaving_out(200), share_left_out);
+  CHECK(share_left_out(data.folder / "alone") > 0);
 }
 
 TEST_CASE("checkpoints that leave out parts of other photos are refused") {
