@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
@@ -19,7 +18,6 @@
 #include "io/npy_file.hpp"
 #include "raysplats/error.hpp"
 #include "scene/camera/camera_model.hpp"
-#include "scene/camera/photo_lens.hpp"
 #include "scene/image/pixel_count.hpp"
 #include "util/path_text.hpp"
 
