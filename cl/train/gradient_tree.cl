@@ -12,14 +12,20 @@ __kernel void add_gradients(uint count,
                             RS_GAUSSIAN_ARGUMENTS,
                             __global const float* restrict met,
                             RS_GRADIENT_ARGUMENTS) {
-#define RS_ADD(number, name, width, place)                 \
-  if (rs_works_on(parts, number)) {                        \
-    const size_t i = rs_item_of(parts, number);            \
-    if (i < (size_t)count * width) g_##name[i] += name[i]; \
+  // Chosen before one is touched, as in train/parameter_mean.cl.
+  const __global float* from = means;
+  __global float* to = g_means;
+  size_t i = 0, end = 0;
+#define RS_CHOOSE(number, name, width, place) \
+  if (rs_works_on(parts, number)) {           \
+    from = name;                              \
+    to = g_##name;                            \
+    i = rs_item_of(parts, number);            \
+    end = (size_t)count * width;              \
   }
-  RS_EACH_PARAMETER_GROUP(RS_ADD)
-  const size_t i = rs_item_of(parts, 0);
-  if (rs_works_on(parts, 0) && i < 3 * (size_t)count) screen[i] += met[i];
+  RS_EACH_PARAMETER_GROUP(RS_CHOOSE)
+  if (i < end) to[i] += from[i];
+  if (rs_works_on(parts, 0) && i < end) screen[i] += met[i];
 }
 
 // sum[i] += numbers[i] for i < count. Launch: one work-item per number. Complexity: O(1) each.

@@ -20,10 +20,18 @@ __kernel void add_sample(uint count,
                          __global float* mean_opacities,
                          __global float* mean_sh) {
   if (guard[0] != 0) return;
-#define RS_ADD(number, name, width, place)                                               \
-  if (rs_works_on(parts, number)) {                                                      \
-    const size_t i = rs_item_of(parts, number);                                          \
-    if (i < (size_t)count * width) mean_##name[i] += share * (name[i] - mean_##name[i]); \
+  // The arrays are chosen before one is touched: where a compiler makes masks of the conditions, it
+  // would touch all five, masked out beyond their ends, which takes CPUs hundreds of cycles.
+  const __global float* from = means;
+  __global float* to = mean_means;
+  size_t i = 0, end = 0;
+#define RS_CHOOSE(number, name, width, place) \
+  if (rs_works_on(parts, number)) {           \
+    from = name;                              \
+    to = mean_##name;                         \
+    i = rs_item_of(parts, number);            \
+    end = (size_t)count * width;              \
   }
-  RS_EACH_PARAMETER_GROUP(RS_ADD)
+  RS_EACH_PARAMETER_GROUP(RS_CHOOSE)
+  if (i < end) to[i] += share * (from[i] - to[i]);
 }

@@ -47,26 +47,6 @@ void copy_bytes(const RawImage& image, const std::vector<std::uint8_t>& bytes, P
 
 }  // namespace
 
-std::array<float, 4> Photo::at(int x, int y) const {
-  const std::size_t plane = pixels();
-  const std::uint32_t* word = words.data() +
-                              static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-                              static_cast<std::size_t>(x);
-  const auto part = [](std::uint32_t value, int shift, std::uint32_t mask) {
-    return static_cast<float>(value >> shift & mask) / static_cast<float>(mask);
-  };
-  if (planes == 1) {
-    return {part(*word, 0, 255), part(*word, 8, 255), part(*word, 16, 255), part(*word, 24, 255)};
-  }
-  if (planes == 2) {
-    return {part(word[0], 0, 65535), part(word[0], 16, 65535), part(word[plane], 0, 65535),
-            part(word[plane], 16, 65535)};
-  }
-  std::array<float, 4> out{};
-  for (std::size_t c = 0; c < 4; ++c) out[c] = std::bit_cast<float>(word[c * plane]);
-  return out;
-}
-
 float Photo::weight(int x, int y) const {
   if (!weighted) return 1.0f;
   const std::uint32_t word = words[static_cast<std::size_t>(planes) * pixels() +

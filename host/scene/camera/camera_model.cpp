@@ -217,15 +217,17 @@ std::optional<glm::dvec2> project(const Camera& camera, const glm::dvec3& world)
   const auto pixels = [&](const glm::dvec2& q) {
     return glm::dvec2(camera.fx * q.x + camera.cx, camera.fy * q.y + camera.cy);
   };
-  const double across = std::hypot(p.x, p.y);
+  // Of the models that need it: it takes longer than all of a pinhole.
+  const auto across_axis = [&] { return std::hypot(p.x, p.y); };
   switch (camera.model) {
     case CameraModel::kPinhole:
       if (!(p.z > 0)) return std::nullopt;
       return pixels({p.x / p.z, p.y / p.z});
     case CameraModel::kOpenCv:
-      if (!(p.z > 0) || !within_limit(camera, across / p.z)) return std::nullopt;
+      if (!(p.z > 0) || !within_limit(camera, across_axis() / p.z)) return std::nullopt;
       return pixels(distort(camera.distortion, {p.x / p.z, p.y / p.z}));
     case CameraModel::kFisheye: {
+      const double across = across_axis();
       const double angle = std::atan2(across, p.z);
       if (glm::length(p) == 0 || !within_limit(camera, angle)) return std::nullopt;
       if (across == 0) return pixels({0, 0});

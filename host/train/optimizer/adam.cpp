@@ -173,8 +173,8 @@ void Adam::remap(const Buffer<std::uint32_t>& source, std::size_t new_count) {
       const std::size_t before = floats_before(group, sh_degree_);
       // Neighbours of GPUs touch neighbouring addresses.
       const std::size_t span = cpu_ ? width : 1;
-      remap_kernel_.launch(Range{{new_count * width / span, 1, 1}, {0, 0, 0}}, *moments, moved,
-                           source, std::uint64_t{before * moment_rows(count_)},
+      remap_kernel_.launch(Range::linear(new_count * width / span, kGroup), *moments, moved, source,
+                           std::uint64_t{before * moment_rows(count_)},
                            std::uint64_t{before * moment_rows(new_count)}, u32(width), u32(span),
                            u32(new_count));
     }

@@ -28,15 +28,6 @@ constexpr double kLookSeconds = 0.5;  // between two looks at how far reading is
 // What a few specks show sets no range, but lamps at night do.
 constexpr std::array<double, 2> kColorEnds{0.001, 0.999};
 
-// The pixel that contains an image point.
-struct Pixel {
-  int x, y;
-};
-Pixel pixel_at(const io::Photo& picture, const glm::dvec2& point) {
-  return {static_cast<int>(std::clamp<double>(point.x, 0, picture.width - 1)),
-          static_cast<int>(std::clamp<double>(point.y, 0, picture.height - 1))};
-}
-
 // One of kColorBins steps along a channel.
 std::size_t bin_of(float value) {
   return std::min(kColorBins - 1, static_cast<std::size_t>(value * kColorBins));
@@ -77,20 +68,8 @@ double mean_share(std::span<const SmallPhoto> photos, const Holds& holds) {
 
 }  // namespace
 
-std::array<float, 4> SmallPhoto::color(int x, int y) const {
-  std::array<float, 4> rgba = picture->at(x, y);
-  for (std::size_t c = 0; c < 3; ++c) rgba[c] *= gain[c];
-  return rgba;
-}
-
-glm::dvec4 SmallPhoto::at(const glm::dvec2& point) const {
-  const Pixel pixel = pixel_at(*picture, point);
-  const std::array<float, 4> rgba = color(pixel.x, pixel.y);
-  return {rgba[0], rgba[1], rgba[2], rgba[3]};
-}
-
 bool SmallPhoto::known(const glm::dvec2& point) const {
-  const Pixel pixel = pixel_at(*picture, point);
+  const glm::ivec2 pixel = pixel_of(point);
   return picture->weight(pixel.x, pixel.y) >= 0.5f;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdio>
@@ -27,10 +28,22 @@ struct SmallPhoto {
   std::array<float, 3> gain{1.0f, 1.0f, 1.0f};  ///< of its colours, in all that is read of it
 
   /// Colour and alpha of a pixel.
-  std::array<float, 4> color(int x, int y) const;
-  /// Colour and alpha of the pixel that contains the image point; the point has to lie
-  /// inside the picture.
-  glm::dvec4 at(const glm::dvec2& point) const;
+  std::array<float, 4> color(int x, int y) const {
+    std::array<float, 4> rgba = picture->at(x, y);
+    for (std::size_t c = 0; c < 3; ++c) rgba[c] *= gain[c];
+    return rgba;
+  }
+  /// The pixel that contains the image point, or the one nearest to it.
+  glm::ivec2 pixel_of(const glm::dvec2& point) const {
+    return {static_cast<int>(std::clamp<double>(point.x, 0, picture->width - 1)),
+            static_cast<int>(std::clamp<double>(point.y, 0, picture->height - 1))};
+  }
+  /// Its colour and alpha.
+  glm::dvec4 at(const glm::dvec2& point) const {
+    const glm::ivec2 pixel = pixel_of(point);
+    const std::array<float, 4> rgba = color(pixel.x, pixel.y);
+    return {rgba[0], rgba[1], rgba[2], rgba[3]};
+  }
   /// Whether the pixel that contains the image point counts: at least half of it is not masked out.
   bool known(const glm::dvec2& point) const;
   /// Whether the pixel shows a body: it is at least half opaque, or shows something (kLeastAlpha)
