@@ -31,6 +31,10 @@
 // First moment 3, second 4, step 6, check for NaN 2.
 #define RS_WORK_ADAM_FLOPS 15
 
+// A sample of the parameters' mean, per parameter: itself and its mean read, the mean written.
+#define RS_WORK_MEAN_BYTES 12
+#define RS_WORK_MEAN_FLOPS 3
+
 // Density statistics, per Gaussian: screen record 12 read, sums 8 read and written.
 #define RS_WORK_STATISTICS_BYTES 28
 

@@ -110,6 +110,7 @@ const std::vector<BenchRowInfo>& bench_rows() {
       {"loss-value", "pixels", "L1 and SSIM"},
       {"loss-gradient", "pixels", "their gradient"},
       {"adam", "Gaussians", "one step of the optimiser"},
+      {"mean", "Gaussians", "one sample of the mean of the last steps"},
       {"density-sums", "Gaussians", "statistics of density control"},
       {"densify", "Gaussians", "density control of every tenth Gaussian, planned on the host"},
       {"iteration", "iterations", "training: bounds, forward, loss, backward, sums, Adam"},

@@ -3,6 +3,7 @@
 #include "parallel/work.h"
 #include "scene/options/trace_option_table.hpp"
 #include "trace/work.h"
+#include "train/schedule.hpp"
 #include "util/rng.hpp"
 
 namespace raysplats {
@@ -189,6 +190,22 @@ BenchOperation SceneBench::Impl::adam_step() {
           {{"adam", {}, false, [this] { return adam_work(); }}}};
 }
 
+// The second sample of a run's mean, told again and again.
+BenchOperation SceneBench::Impl::mean_sample() {
+  TrainOptions run;
+  run.iterations = 1000;
+  const std::int64_t first = mean_from(run) + 1;
+  return {[this, run, first] {
+            open_guard = Buffer<std::uint32_t>(context, 1, "open guard");
+            open_guard.clear();
+            mean.emplace(context);
+            mean->add(run, gaussians(), first, open_guard);
+          },
+          {},
+          [this, run, first] { mean->add(run, gaussians(), first + 1, open_guard); },
+          {{"mean", {}, false, [this] { return mean_work(); }}}};
+}
+
 BenchOperation SceneBench::Impl::density_statistics() {
   return {[this] {
             make_gradients();
@@ -282,6 +299,7 @@ std::vector<BenchOperation> SceneBench::operations() {
           self.backward(),
           self.loss(),
           self.adam_step(),
+          self.mean_sample(),
           self.density_statistics(),
           self.densify(),
           self.iteration(),

@@ -19,6 +19,7 @@
 #include "train/density/density_control.hpp"
 #include "train/loss/image_loss.hpp"
 #include "train/optimizer/adam.hpp"
+#include "train/optimizer/parameter_mean.hpp"
 
 namespace raysplats {
 
@@ -67,6 +68,7 @@ struct SceneBench::Impl {
   BenchOperation rays();
   BenchOperation loss();
   BenchOperation adam_step();
+  BenchOperation mean_sample();
   BenchOperation density_statistics();
   BenchOperation densify();
   BenchOperation iteration();
@@ -87,6 +89,7 @@ struct SceneBench::Impl {
   BenchWork loss_value_work() const;
   BenchWork loss_gradient_work() const;
   BenchWork adam_work() const;
+  BenchWork mean_work() const;
   BenchWork statistics_work() const;
   BenchWork densify_work() const;
   BenchWork iteration_work() const;
@@ -113,6 +116,8 @@ struct SceneBench::Impl {
   Buffer<float> picture, image_gradient;
   Buffer<std::uint32_t> photo;
   std::optional<Adam> adam;
+  std::optional<ParameterMean> mean;
+  Buffer<std::uint32_t> open_guard;
   GaussianGradients gradients;
   std::optional<DensityControl> density;
   std::vector<float> density_signal;

@@ -110,6 +110,13 @@ BenchWork SceneBench::Impl::adam_work() const {
           RS_WORK_ADAM_FLOPS * parameters};
 }
 
+BenchWork SceneBench::Impl::mean_work() const {
+  const double parameters = (RS_WORK_PARAMETERS + 3 * sh_count()) * gaussians_count();
+  return {{{"Gaussians", gaussians_count()}, {"parameters", parameters}},
+          RS_WORK_MEAN_BYTES * parameters,
+          RS_WORK_MEAN_FLOPS * parameters};
+}
+
 BenchWork SceneBench::Impl::statistics_work() const {
   const double n = gaussians_count();
   return {{{"Gaussians", n}}, RS_WORK_STATISTICS_BYTES * n, 2 * n};
