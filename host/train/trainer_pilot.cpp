@@ -27,8 +27,9 @@ constexpr double kCoarseShare = 0.2;     // of the time for steps that coarse on
 constexpr double kFullShare = 0.5;       // and these together with those at full size
 constexpr int kMostPasses = 12;          // that double the count
 constexpr std::int64_t kLeastIterations = 10;
-constexpr double kShortRun = 20;    // seconds of a run that is not worth more measuring
-constexpr double kFillShare = 0.5;  // of the limit that a start takes at most
+constexpr double kShortRun = 20;      // seconds of a run that is not worth long measuring
+constexpr double kBriefShare = 0.02;  // of such a run that further steps take
+constexpr double kFillShare = 0.5;    // of the limit that a start takes at most
 constexpr std::int64_t kFewIterations = 500;
 constexpr double kTellingChange = 0.03;  // of them, that users are told of
 
@@ -177,17 +178,18 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
   const auto rough = [&](std::int64_t iterations) {
     return predicted_seconds(pilot, iterations, gaussians.count);
   };
-  if (run || rough(options.iterations) > kShortRun) {
-    const std::int64_t middle = options.iterations / 2;
-    iteration = middle;
-    pilot.at_full_size = steps.stage(kFullShare);
-    const std::size_t most =
-        most_gaussians(run ? iterations_within(*run, kLeastIterations, rough) : options.iterations);
-    for (int pass = 0; pass < kMostPasses && density.accumulates_at(0) && gaussians.count < most;
-         ++pass)
-      apply_plan(density.split_evenly(gaussians, most));
-    pilot.at_full_size = steps.stage(1);
-  }
+  // Coarse steps alone tell too little of the speed: what does not grow with them is most of them.
+  const double expected = run ? *run : ranks.broadcast_value(0, rough(options.iterations));
+  if (!run && expected < kShortRun)
+    steps.seconds = std::min(seconds, steps.spent + kBriefShare * expected);
+  iteration = options.iterations / 2;
+  pilot.at_full_size = steps.stage(kFullShare);
+  const std::size_t most =
+      most_gaussians(run ? iterations_within(*run, kLeastIterations, rough) : options.iterations);
+  for (int pass = 0; pass < kMostPasses && density.accumulates_at(0) && gaussians.count < most;
+       ++pass)
+    apply_plan(density.split_evenly(gaussians, most));
+  pilot.at_full_size = steps.stage(1);
   spdlog::debug(
       "the last {} of {} timed steps took {:.3g} us a unit of work; {:.3g} hits a pixel and {:.3g} "
       "candidates a Gaussian at first, {:.3g} and {:.3g} with {} Gaussians; a photo is read in "
