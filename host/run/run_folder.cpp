@@ -29,6 +29,7 @@
 namespace raysplats {
 namespace {
 
+constexpr char kMoving[] = "moving";
 constexpr std::array<const char*, 7> kReports{
     "config.toml",    "cameras.json",         "metrics.csv", "metrics.json",
     "exposures.json", "cameras_refined.json", "report.html"};
@@ -82,6 +83,14 @@ void remove_file(const std::filesystem::path& path) {
 void remove_if_empty(const std::filesystem::path& folder) {
   std::error_code error;
   if (std::filesystem::is_empty(folder, error) && !error) remove_file(folder);
+}
+
+void remove_pictures(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> pictures;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() == ".png") pictures.push_back(entry.path());
+  }
+  for (const std::filesystem::path& picture : pictures) remove_file(picture);
 }
 
 }  // namespace
@@ -196,12 +205,22 @@ void RunFolder::remove_model(std::int64_t iteration) const {
 void RunFolder::remove_evaluation(std::int64_t iteration) const {
   if (!writes_) return;
   const std::filesystem::path folder = evaluation_folder(iteration);
-  std::vector<std::filesystem::path> pictures;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (entry.path().extension() == ".png") pictures.push_back(entry.path());
-  }
-  for (const std::filesystem::path& picture : pictures) remove_file(picture);
+  remove_pictures(folder);
   remove_file(folder / "metrics.json");
+  remove_if_empty(folder);
+}
+
+void RunFolder::write_moving(const std::string& name, const Image& mask) const {
+  if (!writes_) return;
+  make_output_directory(path_ / kMoving);
+  write_image(path_ / kMoving / (name + ".png"), mask);
+}
+
+void RunFolder::remove_moving() const {
+  const std::filesystem::path folder = path_ / kMoving;
+  std::error_code error;
+  if (!writes_ || !std::filesystem::is_directory(folder, error)) return;
+  remove_pictures(folder);
   remove_if_empty(folder);
 }
 
@@ -222,6 +241,7 @@ void RunFolder::remove_after(std::int64_t iteration) const {
   }
   if (iteration > 0) return;
   for (const char* report : kReports) remove_file(path_ / report);
+  remove_moving();
 }
 
 void check_no_run(const std::filesystem::path& folder) {

@@ -195,6 +195,7 @@ struct Trainer::Impl {
   std::int64_t last_look() const;
   void warn_of_late_look() const;
   void leave_out_moving_areas();
+  void write_moving() const;
   void store_moving(CheckpointSections& sections) const;
   void restore_moving(const Checkpoint& checkpoint);
 

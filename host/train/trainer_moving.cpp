@@ -9,6 +9,7 @@
 
 #include "eval/moving_areas.hpp"
 #include "eval/photo_agreement.hpp"
+#include "render/frame_writer.hpp"
 #include "scene/image/planes.hpp"
 #include "train/schedule.hpp"
 #include "train/trainer_impl.hpp"
@@ -17,6 +18,12 @@ namespace raysplats {
 namespace {
 
 constexpr std::uint32_t kHalf = 0xffffu;  // of a word, which a float of a checkpoint holds exactly
+
+// Which of `count` parts of an axis of `length` pixels one lies in.
+std::size_t scaled(int pixel, int length, int count) {
+  return static_cast<std::size_t>((2 * std::int64_t{pixel} + 1) * count /
+                                  (2 * std::int64_t{length}));
+}
 
 // The photo's colours and how much each pixel counts, as the loss takes them.
 struct CountedPhoto {
@@ -39,6 +46,19 @@ CountedPhoto counted_photo(const DevicePhoto& device,
             cut_out ? pixel[3] * pixel[k] + (1 - pixel[3]) * background[k] : pixel[k];
       }
       out.weight.at(x, y, 0) = cut_out ? photo.weight(x, y) : pixel[3];
+    }
+  }
+  return out;
+}
+
+// 0 where the mask marks what the camera's photo shows, 1 elsewhere.
+Image counted_pixels(const PixelMask& mask, const Camera& camera) {
+  Image out(camera.width, camera.height, 1);
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      const auto from = static_cast<std::size_t>(mask.width) * scaled(y, out.height, mask.height) +
+                        scaled(x, out.width, mask.width);
+      out.at(x, y, 0) = mask[from] ? 0.0f : 1.0f;
     }
   }
   return out;
@@ -147,10 +167,21 @@ void Trainer::Impl::leave_out_moving_areas() {
     photos += mask.width > 0 ? 1 : 0;
   }
   const bool last = iteration >= last_look();
+  if (last) write_moving();
   spdlog::log(last ? spdlog::level::info : spdlog::level::debug,
               "iteration {}: {:.1f} % of the training photos, in {} of {}, show what moves or "
               "changes, and are left out",
               iteration, 100 * share, photos, moving.size());
+}
+
+// Masks as data sets have them, to be looked at, mended and used.
+void Trainer::Impl::write_moving() const {
+  run.remove_moving();
+  const std::vector<std::string> names = frame_names(train_cameras);
+  for (std::size_t view = 0; view < moving.size(); ++view) {
+    if (moving[view].width > 0)
+      run.write_moving(names[view], counted_pixels(moving[view], train_cameras[view]));
+  }
 }
 
 void Trainer::Impl::store_moving(CheckpointSections& sections) const {

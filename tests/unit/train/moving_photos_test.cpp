@@ -72,6 +72,18 @@ double share_left_out(const std::filesystem::path& run) {
   return sum / static_cast<double>(metrics.at("photos").size());
 }
 
+/// How many photos' worth of pixels is black in the masks of a folder.
+double black_photos(const std::filesystem::path& folder) {
+  double sum = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const Image mask = read_image(entry.path());
+    for (int y = 0; y < mask.height; ++y) {
+      for (int x = 0; x < mask.width; ++x) sum += mask.at(x, y, 0) < 0.5f ? 1.0 : 0.0;
+    }
+  }
+  return sum / (kSize * kSize);
+}
+
 }  // namespace
 
 TEST_CASE("what moves in the photos is left out of a run, which gains by it") {
@@ -88,7 +100,10 @@ TEST_CASE("what moves in the photos is left out of a run, which gains by it") {
       MESSAGE(share << " of " << kBoxes << " left out");
       CHECK(share > 0.6 * kBoxes);
       CHECK(share < 1.8 * kBoxes);
+      const auto photos = static_cast<double>(data.dataset.indices(Split::kTrain).size());
+      CHECK(black_photos(run / "moving") == doctest::Approx(photos * share));
     } else {
+      CHECK(!std::filesystem::exists(run / "moving"));
       CHECK(share == 0);
     }
     return psnr;
