@@ -14,6 +14,7 @@
 #include "raysplats/camera.hpp"
 #include "raysplats/evaluation_row.hpp"
 #include "raysplats/gaussians.hpp"
+#include "raysplats/image.hpp"
 #include "raysplats/trace_options.hpp"
 #include "raysplats/train_options.hpp"
 #include "util/file_lock.hpp"
