@@ -4,6 +4,8 @@
 #include "trace/arguments.h"
 #include "train/parameter_groups.h"
 
+#define RS_TO(name) g_##name
+
 // Adds the gradients of one view, or of several, to others: of all parameters of `count` Gaussians,
 // and what density control reads, `met`, which is as wide as the means. Launch: a work-item for
 // each float of the parameters, in groups as `parts` says. Complexity: O(1) each.
@@ -12,18 +14,10 @@ __kernel void add_gradients(uint count,
                             RS_GAUSSIAN_ARGUMENTS,
                             __global const float* restrict met,
                             RS_GRADIENT_ARGUMENTS) {
-  // Chosen before one is touched, as in train/parameter_mean.cl.
   const __global float* from = means;
-  __global float* to = g_means;
+  __global float* to = RS_TO(means);
   size_t i = 0, end = 0;
-#define RS_CHOOSE(number, name, width, place) \
-  if (rs_works_on(parts, number)) {           \
-    from = name;                              \
-    to = g_##name;                            \
-    i = rs_item_of(parts, number);            \
-    end = (size_t)count * width;              \
-  }
-  RS_EACH_PARAMETER_GROUP(RS_CHOOSE)
+  RS_EACH_PARAMETER_GROUP(RS_CHOOSE_ARRAYS)
   if (i < end) to[i] += from[i];
   if (rs_works_on(parts, 0) && i < end) screen[i] += met[i];
 }

@@ -27,4 +27,17 @@
 #define rs_item_of(parts, number) \
   ((get_group_id(0) - (parts).first[number]) * (size_t)get_local_size(0) + get_local_id(0))
 
+// A visitor that sets `from` and `to`, the arrays of the group of parameters that this group of
+// work-items belongs to (RS_TO(name) is what the kernel calls those of `to`), its work-item's
+// number `i` and their number `end`. Arrays are chosen before one is touched: where a compiler
+// makes masks of the conditions, it would touch all of them, masked out beyond their ends, which
+// takes CPUs hundreds of cycles.
+#define RS_CHOOSE_ARRAYS(number, name, width, place) \
+  if (rs_works_on(parts, number)) {                  \
+    from = name;                                     \
+    to = RS_TO(name);                                \
+    i = rs_item_of(parts, number);                   \
+    end = (size_t)count * width;                     \
+  }
+
 #endif

@@ -6,6 +6,8 @@
 #include "trace/arguments.h"
 #include "train/parameter_groups.h"
 
+#define RS_TO(name) mean_##name
+
 // All means move by `share` of their way to the parameters: 1 / (samples so far, this one
 // included). A guard word that is not 0 turns it off. Launch: a work-item for each float of `count`
 // Gaussians, in groups as `parts` says.
@@ -20,18 +22,9 @@ __kernel void add_sample(uint count,
                          __global float* mean_opacities,
                          __global float* mean_sh) {
   if (guard[0] != 0) return;
-  // The arrays are chosen before one is touched: where a compiler makes masks of the conditions, it
-  // would touch all five, masked out beyond their ends, which takes CPUs hundreds of cycles.
   const __global float* from = means;
-  __global float* to = mean_means;
+  __global float* to = RS_TO(means);
   size_t i = 0, end = 0;
-#define RS_CHOOSE(number, name, width, place) \
-  if (rs_works_on(parts, number)) {           \
-    from = name;                              \
-    to = mean_##name;                         \
-    i = rs_item_of(parts, number);            \
-    end = (size_t)count * width;              \
-  }
-  RS_EACH_PARAMETER_GROUP(RS_CHOOSE)
+  RS_EACH_PARAMETER_GROUP(RS_CHOOSE_ARRAYS)
   if (i < end) to[i] += share * (from[i] - to[i]);
 }

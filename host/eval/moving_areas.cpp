@@ -25,6 +25,7 @@ namespace {
 
 constexpr int kFits = 4;                // of the colours
 constexpr double kLeastError = 0.03;    // below which pixels of a fit weigh the same
+constexpr int kMaskSide = 384;          // pixels of a mask that is written
 constexpr double kFar = 0.05;           // an error
 constexpr double kVeryFar = 0.12;       // and one that others are joined to
 constexpr double kTimesMedian = 3;      // of all errors: far; twice as much: very far
@@ -217,6 +218,29 @@ std::vector<PixelMask> moving_areas(std::span<const ComparedPhoto> photos) {
     }
     out[i] = joined(seeds, grows);
   });
+  return out;
+}
+
+Image counted_in_photo(const PixelMask& moving, const View& view) {
+  Camera photo = view.source_camera;  // in the place of the view, whatever its own
+  photo.rotation = view.camera.rotation;
+  photo.translation = view.camera.translation;
+  const double larger = static_cast<double>(std::max(photo.width, photo.height)) / kMaskSide;
+  if (larger > 1) photo = downscaled(photo, larger);
+  Image out(photo.width, photo.height, 1);
+  for (int y = 0; y < out.height; ++y) {
+    for (int x = 0; x < out.width; ++x) {
+      out.at(x, y, 0) = 1.0f;
+      const CameraRay ray = camera_ray(photo, x + 0.5, y + 0.5);
+      if (!ray.valid) continue;
+      const auto point = project_into(view.camera, ray.origin + ray.direction);
+      if (!point) continue;
+      const auto column = static_cast<int>(point->x / view.camera.width * moving.width);
+      const auto row = static_cast<int>(point->y / view.camera.height * moving.height);
+      const std::size_t pixel = pixel_count(moving.width, row) + static_cast<std::size_t>(column);
+      if (moving[pixel]) out.at(x, y, 0) = 0.0f;
+    }
+  }
   return out;
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "raysplats/camera.hpp"
+#include "raysplats/dataset.hpp"
 #include "raysplats/image.hpp"
 #include "scene/image/pixel_mask.hpp"
 
@@ -32,5 +33,9 @@ std::vector<float> fitted_error(const Image& picture, const Image& photo, const 
 /// of the model, and seen by a photo whose pixel there counts and whose own depth is not less than
 /// 0.85 of its distance. O(photos^2 + photos x pixels).
 std::vector<PixelMask> moving_areas(std::span<const ComparedPhoto> photos);
+
+/// A mask of the view's photo as it is on disk, with its lens: 0 where the picture that loading
+/// makes of it shows what `moving` marks, 1 elsewhere. 384 pixels at most on its longer side.
+Image counted_in_photo(const PixelMask& moving, const View& view);
 
 }  // namespace raysplats

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "io/dataset/data_origin.hpp"
+#include "io/dataset/transforms.hpp"
 #include "io/dataset/transforms_camera.hpp"
 #include "io/file_hash.hpp"
 #include "io/model/model_formats.hpp"
@@ -210,18 +211,27 @@ void RunFolder::remove_evaluation(std::int64_t iteration) const {
   remove_if_empty(folder);
 }
 
-void RunFolder::write_moving(const std::string& name, const Image& mask) const {
+void RunFolder::write_moving(const std::string& photo, const Image& mask) const {
   if (!writes_) return;
-  make_output_directory(path_ / kMoving);
-  write_image(path_ / kMoving / (name + ".png"), mask);
+  const std::filesystem::path file = path_ / kMoving / (io::inner_name(photo) + ".png");
+  make_output_directory(file.parent_path());
+  write_image(file, mask);
 }
 
 void RunFolder::remove_moving() const {
   const std::filesystem::path folder = path_ / kMoving;
   std::error_code error;
   if (!writes_ || !std::filesystem::is_directory(folder, error)) return;
-  remove_pictures(folder);
-  remove_if_empty(folder);
+  std::vector<std::filesystem::path> folders{folder};
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
+    if (entry.is_directory()) folders.push_back(entry.path());
+  }
+  // The innermost first.
+  std::sort(folders.rbegin(), folders.rend());
+  for (const std::filesystem::path& each : folders) {
+    remove_pictures(each);
+    remove_if_empty(each);
+  }
 }
 
 std::string RunFolder::model_hash(std::int64_t iteration) const {

@@ -57,9 +57,10 @@ class RunFolder {
   /// set's files, whose `origin` was taken off.
   void write_refined_cameras(std::vector<Camera> cameras,
                              const std::array<double, 3>& origin) const;
-  /// Writes moving/NAME.png, a mask.
-  void write_moving(const std::string& name, const Image& mask) const;
-  /// Removes all of them.
+  /// Writes moving/NAME.EXT.png, a mask of the photo of that name, as COLMAP calls masks. In any
+  /// thread.
+  void write_moving(const std::string& photo, const Image& mask) const;
+  /// Removes all masks.
   void remove_moving() const;
   /// `trace` goes into the header, for those who take the model elsewhere. Numbers that are not
   /// finite are kept: what a run that diverged has learnt is not to be lost.

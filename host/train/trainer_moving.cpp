@@ -9,21 +9,15 @@
 
 #include "eval/moving_areas.hpp"
 #include "eval/photo_agreement.hpp"
-#include "render/frame_writer.hpp"
 #include "scene/image/planes.hpp"
 #include "train/schedule.hpp"
 #include "train/trainer_impl.hpp"
+#include "util/parallel.hpp"
 
 namespace raysplats {
 namespace {
 
 constexpr std::uint32_t kHalf = 0xffffu;  // of a word, which a float of a checkpoint holds exactly
-
-// Which of `count` parts of an axis of `length` pixels one lies in.
-std::size_t scaled(int pixel, int length, int count) {
-  return static_cast<std::size_t>((2 * std::int64_t{pixel} + 1) * count /
-                                  (2 * std::int64_t{length}));
-}
 
 // The photo's colours and how much each pixel counts, as the loss takes them.
 struct CountedPhoto {
@@ -46,19 +40,6 @@ CountedPhoto counted_photo(const DevicePhoto& device,
             cut_out ? pixel[3] * pixel[k] + (1 - pixel[3]) * background[k] : pixel[k];
       }
       out.weight.at(x, y, 0) = cut_out ? photo.weight(x, y) : pixel[3];
-    }
-  }
-  return out;
-}
-
-// 0 where the mask marks what the camera's photo shows, 1 elsewhere.
-Image counted_pixels(const PixelMask& mask, const Camera& camera) {
-  Image out(camera.width, camera.height, 1);
-  for (int y = 0; y < out.height; ++y) {
-    for (int x = 0; x < out.width; ++x) {
-      const auto from = static_cast<std::size_t>(mask.width) * scaled(y, out.height, mask.height) +
-                        scaled(x, out.width, mask.width);
-      out.at(x, y, 0) = mask[from] ? 0.0f : 1.0f;
     }
   }
   return out;
@@ -177,11 +158,11 @@ void Trainer::Impl::leave_out_moving_areas() {
 // Masks as data sets have them, to be looked at, mended and used.
 void Trainer::Impl::write_moving() const {
   run.remove_moving();
-  const std::vector<std::string> names = frame_names(train_cameras);
-  for (std::size_t view = 0; view < moving.size(); ++view) {
-    if (moving[view].width > 0)
-      run.write_moving(names[view], counted_pixels(moving[view], train_cameras[view]));
-  }
+  in_parallel(moving.size(), [&](std::size_t i) {
+    if (moving[i].width == 0) return;
+    const View& view = dataset.views[train_views[i]];
+    run.write_moving(view.camera.name, counted_in_photo(moving[i], view));
+  });
 }
 
 void Trainer::Impl::store_moving(CheckpointSections& sections) const {

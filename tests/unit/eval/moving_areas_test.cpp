@@ -11,8 +11,12 @@
 #include <limits>
 #include <vector>
 
+#include "io/dataset/photo_views.hpp"
+#include "io/photo/photo.hpp"
+#include "raysplats/io.hpp"
 #include "scene/camera/camera_model.hpp"
 #include "scene/camera/view_axes.hpp"
+#include "unit/temporary_directory.hpp"
 #include "util/rng.hpp"
 
 using namespace raysplats;
@@ -220,4 +224,40 @@ TEST_CASE("things that move are found by panoramas, and before a sky") {
   const std::vector<PixelMask> found = moving_areas(photos);
   for (std::size_t i = 0; i < photos.size(); ++i)
     CHECK(count(found[i]) == (i == 2 || i == 6 ? 100 : 0));
+}
+
+TEST_CASE(
+    "a mask of what moves leaves out the same, once it is read as a photo's, through lenses") {
+  const TemporaryDirectory folder;
+  for (const CameraModel model :
+       {CameraModel::kPinhole, CameraModel::kOpenCv, CameraModel::kFisheye}) {
+    INFO(static_cast<int>(model));
+    Camera nominal = look_at({0.3, -0.2, -4}, {0, 0, 0}, {0, 1, 0}, 400, 300, 300);
+    nominal.model = model;
+    if (model == CameraModel::kOpenCv) nominal.distortion.k1 = -0.2;
+    View view;
+    view.image_path = folder / "photo.png";
+    write_image(view.image_path, Image(400, 300, 3));
+    io::set_cameras(view, nominal, {400, 300}, 2, true);
+    const int width = view.camera.width, height = view.camera.height;
+    // A thing at a corner, where a lens moves it most.
+    PixelMask moving(width / 2, height / 2);
+    const auto is_thing = [&](int x, int y) {
+      return x < moving.width / 4 && y < moving.height / 3;
+    };
+    for (int y = 0; y < moving.height; ++y) {
+      for (int x = 0; x < moving.width; ++x) {
+        if (is_thing(x, y)) moving.set(pixel_count(moving.width, y) + static_cast<std::size_t>(x));
+      }
+    }
+    view.mask_path = folder / "mask.png";
+    write_image(view.mask_path, counted_in_photo(moving, view));
+    const io::Photo photo = io::load_photo(view);
+    int wrong = 0;
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x)
+        wrong += (photo.at(x, y)[3] < 0.5f) != is_thing(x / 2, y / 2) ? 1 : 0;
+    }
+    CHECK(wrong < (width + height) / 4);  // of the pixels along the thing's two edges
+  }
 }

@@ -148,3 +148,23 @@ TEST_CASE("columns of a run are read alike where decimals have a comma") {
   CHECK(run.former_rows()[0].loss == 0.5);
   CHECK(run.former_rows()[0].psnr == 20.75);
 }
+
+TEST_CASE("masks of what moves lie as their photos do, and go with the run, alone") {
+  const TemporaryDirectory folder;
+  const std::filesystem::path path = folder / "run", moving = path / "moving";
+  const RunFolder run(path);
+  const Image mask(4, 3, 1);
+  for (const char* photo : {"left/01.jpg", "right/01.jpg", "02.jpg", "../../03.jpg"})
+    run.write_moving(photo, mask);
+  for (const char* file : {"left/01.jpg.png", "right/01.jpg.png", "02.jpg.png", "03.jpg.png"})
+    CHECK(std::filesystem::is_regular_file(moving / file));
+  std::ofstream(moving / "left" / "notes.txt") << "mine";
+  run.remove_after(0);
+  CHECK(std::filesystem::exists(moving / "left" / "notes.txt"));
+  CHECK_FALSE(std::filesystem::exists(moving / "left" / "01.jpg.png"));
+  CHECK_FALSE(std::filesystem::exists(moving / "right"));
+  CHECK_FALSE(std::filesystem::exists(moving / "02.jpg.png"));
+  std::filesystem::remove(moving / "left" / "notes.txt");
+  run.remove_moving();
+  CHECK_FALSE(std::filesystem::exists(moving));
+}
