@@ -3,8 +3,8 @@
 // traces BLOCK x BLOCK packets of PACKET rays (packet.h), one after the other; the packets of a
 // tile share its candidate list, sorted by a lower bound of the depth: what lies before the next
 // candidate's bound can be blended.
-//   global size: blocks in x and y from the window's first tile on; local: the blocks of a tile
-//   (any size is correct)
+//   global size: the blocks of whole tiles in x and y from the window's first tile on; any local
+//   size
 // With LENS a launch traces the tiles of one face (lens_tiles.cl) and leaves the others.
 // Cost follows the candidates of the tile that meet the packets. Rows of Gaussians are blended
 // without sorting (packet_rows.h); packets beyond its limits start again with sorted lists
@@ -24,6 +24,32 @@
 #include "trace/packet_sorted.h"
 #include "trace/packet_state.h"
 
+#ifndef SPREAD
+#define SPREAD 1
+#endif
+
+// Work-items of a tile.
+#define ACROSS (TILE / (BLOCK * PACKET_WIDTH))
+#define DOWN (TILE / (BLOCK * PACKET_HEIGHT))
+
+// Column and row of the work-item's tile in the window. Tiles that are launched one after the other
+// come from SPREAD stretches of the picture in turn: a thread that is given many at once gets some
+// of what is much work and some of what is little.
+uint2 spread_tile(const uint columns) {
+  const uint column = get_global_id(0) / ACROSS, row = get_global_id(1) / DOWN;
+#if SPREAD > 1
+  if (column >= columns) return (uint2)(column, row);
+  const uint first_row = get_global_offset(1) / DOWN;
+  const uint tiles = columns * (uint)(get_global_size(1) / DOWN);
+  const uint number = (row - first_row) * columns + column;
+  const uint stretch = number % SPREAD;
+  const uint tile = stretch * (tiles / SPREAD) + min(stretch, tiles % SPREAD) + number / SPREAD;
+  return (uint2)(tile % columns, first_row + tile / columns);
+#else
+  return (uint2)(column, row);
+#endif
+}
+
 // counters: chunks wanted, rays that stopped at max_hits, hits (two words).
 __kernel void trace_forward(RS_LIST_ARGUMENTS,
                             RS_VIEW_ARGUMENTS,
@@ -38,12 +64,13 @@ __kernel void trace_forward(RS_LIST_ARGUMENTS,
                              forward.max_hits};
   const float4 background =
       (float4)(forward.background[0], forward.background[1], forward.background[2], 0.0f);
-  const int window_x = get_global_id(0) * (BLOCK * PACKET_WIDTH);
-  const int window_y = get_global_id(1) * (BLOCK * PACKET_HEIGHT);
-  const int block_x = window_x + forward.window[0] * TILE;
-  const int block_y = window_y + forward.window[1] * TILE;
-  const int column = window_x / TILE, row = window_y / TILE;
+  const uint2 at = spread_tile(forward.window[2]);
+  const int column = at.x, row = at.y;
   if (column >= forward.window[2] || row >= forward.window[3]) return;
+  const int block_x =
+      (column + forward.window[0]) * TILE + get_global_id(0) % ACROSS * (BLOCK * PACKET_WIDTH);
+  const int block_y =
+      (row + forward.window[1]) * TILE + get_global_id(1) % DOWN * (BLOCK * PACKET_HEIGHT);
   if (block_x >= camera.width || block_y >= camera.height) return;
   const uint tile = row * forward.window[2] + column;
   const uint picture_tiles_x = (camera.width + TILE - 1) / TILE;

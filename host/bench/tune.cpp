@@ -20,7 +20,7 @@ constexpr int kRounds = 3;
 constexpr std::array<int, 5> kWidths{1, 2, 4, 8, 16};
 constexpr std::array<int, 4> kGroupWidths{8, 16, 32, 64};
 constexpr std::array<int, 3> kTiles{16, 32, 64};
-constexpr std::array<int, 6> kPending{24, 32, 48, 64, 96, 128};
+constexpr std::array<int, 7> kPending{24, 32, 48, 64, 96, 128, 192};
 constexpr std::array<int, 5> kGroups{1, 16, 32, 64, 128};
 
 // A scene on the device and what forward and backward passes of any tracer share.

@@ -31,7 +31,9 @@ std::vector<Kernel> PacketKernels::forward(const BuildOptions& build) {
                          layout_.crowded_rows[0]);
   }
   BuildOptions own = build;
-  own.define("BLOCK", layout_.block).define("PENDING", layout_.pending);
+  own.define("BLOCK", layout_.block)
+      .define("PENDING", layout_.pending)
+      .define("SPREAD", layout_.stretches);
   return {context_.kernel("trace/camera_forward.cl", "trace_forward", own)};
 }
 
@@ -86,12 +88,12 @@ Range PacketKernels::range(const Kernel& kernel,
   item.width *= block;
   item.height *= block;
   const auto tile = static_cast<std::size_t>(item.tile / item.height);
-  const std::size_t across =
-      std::min(tiles.columns * static_cast<std::size_t>(item.tile / item.width),
-               static_cast<std::size_t>((width + item.width - 1) / item.width));
+  const std::size_t across = tiles.columns * static_cast<std::size_t>(item.tile / item.width);
   Range range;
   if (layout_.grouped) {
-    range = {{across * items(), tiles.rows * tile, 1}, {items(), 1, 1}, {}};
+    const std::size_t inside =
+        std::min(across, static_cast<std::size_t>((width + item.width - 1) / item.width));
+    range = {{inside * items(), tiles.rows * tile, 1}, {items(), 1, 1}, {}};
   } else {
     const auto group = packet_group(item, kernel.max_work_group_size());
     range = Range::plane(across, tiles.rows * tile, group[0], group[1]);

@@ -123,7 +123,12 @@ PacketLayout packet_layout(const DeviceInfo& device, const TraceOptions& options
   // CPUs gain from shared lists of larger tiles; GPUs need many small groups.
   const bool cpu = device.type == DeviceType::kCpu;
   layout.tile = cpu ? 32 : 16;
-  layout.pending = cpu ? 96 : 48;
+  layout.pending = cpu ? 192 : 48;
+  // A CPU's driver hands out many neighbouring groups at once: where they are small and from all
+  // over the picture, every thread has as much to do.
+  layout.group = cpu ? 1 : 0;
+  if (cpu && device.compute_units > 1)
+    layout.stretches = static_cast<int>(std::clamp(2 * device.compute_units, 4u, 16u));
   const auto& tuning = device.tuning;
   if (tuning && tuned_shape(*tuning) == shape && tuning->packet_width == lanes) {
     layout.tile = tuning->tile;

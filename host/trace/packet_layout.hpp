@@ -16,12 +16,13 @@ struct PacketLayout {
   bool subgroups = false;  ///< and each work-group is one subgroup, if the compiler says so
   bool sized = false;      ///< which is demanded of a compiler that can choose the size
   int lanes = 1;
-  int width = 1;     ///< pixels
-  int height = 1;    ///< pixels
-  int block = 1;     ///< packets a side that one work-item of the forward pass traces
-  int tile = 16;     ///< pixels
-  int pending = 64;  ///< rows, or entries of a lane's sorted list, at once
-  int group = 0;     ///< most work-items of a work-group; 0 = all packets of a tile
+  int width = 1;      ///< pixels
+  int height = 1;     ///< pixels
+  int block = 1;      ///< packets a side that one work-item of the forward pass traces
+  int tile = 16;      ///< pixels
+  int pending = 64;   ///< rows, or entries of a lane's sorted list, at once
+  int group = 0;      ///< most work-items of a work-group; 0 = all packets of a tile
+  int stretches = 1;  ///< of a launch, whose tiles take turns (cl/trace/camera_forward.cl)
   /// Rows of crowded packets (CROWDED in cl/trace/group.h) that local memory holds, in the forward
   /// and in the backward pass.
   std::array<int, 2> crowded_rows{};

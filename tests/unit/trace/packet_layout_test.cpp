@@ -54,8 +54,20 @@ TEST_CASE("packet shape: follows the device's vectors") {
     CHECK(layout.width * layout.height == lanes);
     CHECK(layout.tile % (layout.block * layout.width) == 0);
     CHECK(layout.tile % (layout.block * layout.height) == 0);
-    CHECK(layout.group == 0);
+    CHECK(layout.group == 1);
   }
+}
+
+TEST_CASE("packet shape: tiles of a picture take turns where a device has several processors") {
+  const auto stretches = [](DeviceInfo device, std::uint32_t units) {
+    device.compute_units = units;
+    return packet_layout(device, width_of(0)).stretches;
+  };
+  CHECK(stretches(cpu(16), 1) == 1);
+  CHECK(stretches(cpu(16), 2) == 4);
+  CHECK(stretches(cpu(16), 6) == 12);
+  CHECK(stretches(cpu(16), 128) == 16);
+  CHECK(stretches(gpu_of(32768), 96) == 1);
 }
 
 TEST_CASE("packet shape: a tuning counts unless another width is asked for") {
@@ -73,7 +85,7 @@ TEST_CASE("packet shape: a tuning counts unless another width is asked for") {
   CHECK(other.lanes == 16);
   CHECK(other.tile == plain.tile);
   CHECK(other.pending == plain.pending);
-  CHECK(other.group == 0);
+  CHECK(other.group == plain.group);
 }
 
 TEST_CASE("packet shape: groups on GPUs, and where they are asked for") {
@@ -186,6 +198,7 @@ TEST_CASE("packet shape: open rows of crowded packets fit local memory") {
 TEST_CASE("packet group: within the limits of the kernel and the tuning") {
   PacketLayout layout = packet_layout(cpu(16), width_of(16));
   layout.tile = 32;
+  layout.group = 0;
   const auto size = [&](std::size_t limit) {
     const auto group = packet_group(layout, limit);
     return group[0] * group[1];
