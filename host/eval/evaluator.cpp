@@ -24,9 +24,13 @@
 #include "scene/image/sharpness.hpp"
 #include "trace/sky.hpp"
 #include "util/atomic_file.hpp"
+#include "util/background_tasks.hpp"
 
 namespace raysplats {
 namespace {
+
+/// Pictures that are written at once: a photo and its render each.
+constexpr std::size_t kMostPictures = 4;
 
 struct Comparison {
   Image render;  // RGB in [0, 1]
@@ -255,6 +259,7 @@ class Evaluation {
       hide_masked_out(*pair);
       write_picture(i, *pair);
     }
+    files_.finish();
     // Those of other ranks are not known to be there.
     if (ranks_.all_reduce_or(cut_off)) shown_.clear();
   }
@@ -316,8 +321,12 @@ class Evaluation {
     return traced;
   }
   std::string picture_of(std::size_t i) const { return names_[i] + ".png"; }
-  void write_picture(std::size_t i, const Comparison& pair) const {
-    write_image(output_ / picture_of(i), side_by_side(pair.photo, pair.render));
+  // Beside the next comparison.
+  void write_picture(std::size_t i, const Comparison& pair) {
+    files_.add(kMostPictures,
+               [path = output_ / picture_of(i), both = side_by_side(pair.photo, pair.render)] {
+                 write_image(path, both);
+               });
   }
   // Ranks that render together stop together.
   bool for_all(bool stop) const { return options_.together ? ranks_.all_reduce_or(stop) : stop; }
@@ -347,7 +356,7 @@ class Evaluation {
   }
 
   // Adds a view to those of this rank. Returns whether to go on.
-  bool measure_view(std::size_t i, std::vector<MeasuredView>& own) const {
+  bool measure_view(std::size_t i, std::vector<MeasuredView>& own) {
     std::optional<Comparison> pair = compare_view(i);
     if (!pair) return !compares_;
     MeasuredView measured = measure(i, *pair, options_.lpips);
@@ -378,6 +387,7 @@ class Evaluation {
   bool stopped_ = false;
   std::vector<MeasuredView> all_;
   std::set<std::size_t> shown_;  // whose pictures are written
+  BackgroundTasks files_;
 };
 
 }  // namespace

@@ -8,6 +8,8 @@
 #include <map>
 #include <set>
 #include <span>
+#include <thread>
+#include <utility>
 
 #include "comm/communicator.hpp"
 #include "raysplats/error.hpp"
@@ -22,6 +24,9 @@ namespace raysplats {
 namespace {
 
 constexpr int kMaxSupersample = 16;
+
+/// Of frames that wait to be written, beside what their compression takes.
+constexpr std::size_t kMostBytes = std::size_t{512} << 20;
 
 /// The folders and the stem of an image name in one word; "." and ".." of relative names vanish.
 std::string joined(const std::filesystem::path& name) {
@@ -106,52 +111,11 @@ Exposed exposed(Tracer& tracer,
   return out;
 }
 
-}  // namespace
-
-std::string file_extension(FrameFormat format) {
-  switch (format) {
-    case FrameFormat::kExr:
-      return ".exr";
-    case FrameFormat::kJpg:
-      return ".jpg";
-    case FrameFormat::kPng:
-      break;
-  }
-  return ".png";
-}
-
-std::vector<std::string> frame_names(std::span<const Camera> cameras) {
-  std::vector<std::string> names(cameras.size());
-  std::map<std::string, std::size_t> stems;
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    names[i] = std::filesystem::path(cameras[i].name).stem().string();
-    if (names[i].empty()) names[i] = fmt::format("frame_{:04d}", i);
-    ++stems[names[i]];
-  }
-  std::set<std::string> used;
-  // The first number behind a name that was not tried yet: many frames may have one name.
-  std::map<std::string, int> untried;
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    std::string name = names[i];
-    if (stems[name] > 1) {
-      name = joined(cameras[i].name);
-      if (name.empty()) name = names[i];
-    }
-    std::string unique = name;
-    int& n = untried.try_emplace(name, 2).first->second;
-    for (; !used.insert(unique).second; ++n) unique = fmt::format("{}_{}", name, n);
-    names[i] = unique;
-  }
-  return names;
-}
-
-void write_frame(const std::filesystem::path& stem,
+void write_files(const std::filesystem::path& stem,
                  const Image& rgba,
                  const Camera& camera,
                  const FrameLayers& layers,
                  const FrameOptions& options) {
-  if (options.video) options.video->add(rgba);
-  if (!options.files) return;
   const auto file = [&](const char* suffix, const std::filesystem::path& type) {
     std::filesystem::path path = stem;
     path += suffix;
@@ -193,6 +157,62 @@ void write_frame(const std::filesystem::path& stem,
   if (options.hits) write_image(file("_hits", ".png"), hits_preview(layers.hits));
 }
 
+}  // namespace
+
+std::string file_extension(FrameFormat format) {
+  switch (format) {
+    case FrameFormat::kExr:
+      return ".exr";
+    case FrameFormat::kJpg:
+      return ".jpg";
+    case FrameFormat::kPng:
+      break;
+  }
+  return ".png";
+}
+
+std::vector<std::string> frame_names(std::span<const Camera> cameras) {
+  std::vector<std::string> names(cameras.size());
+  std::map<std::string, std::size_t> stems;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    names[i] = std::filesystem::path(cameras[i].name).stem().string();
+    if (names[i].empty()) names[i] = fmt::format("frame_{:04d}", i);
+    ++stems[names[i]];
+  }
+  std::set<std::string> used;
+  // The first number behind a name that was not tried yet: many frames may have one name.
+  std::map<std::string, int> untried;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    std::string name = names[i];
+    if (stems[name] > 1) {
+      name = joined(cameras[i].name);
+      if (name.empty()) name = names[i];
+    }
+    std::string unique = name;
+    int& n = untried.try_emplace(name, 2).first->second;
+    for (; !used.insert(unique).second; ++n) unique = fmt::format("{}_{}", name, n);
+    names[i] = unique;
+  }
+  return names;
+}
+
+void FrameWriter::add(const std::string& name,
+                      Image rgba,
+                      const Camera& camera,
+                      FrameLayers layers) {
+  if (options_.video) options_.video->add(rgba);
+  if (!options_.files) return;
+  const std::size_t bytes =
+      sizeof(float) * (rgba.data.size() + layers.depth.data.size() + layers.normals.data.size() +
+                       layers.hits.data.size() + layers.alpha.data.size());
+  const std::size_t threads = std::max(1u, std::thread::hardware_concurrency());
+  const std::size_t most =
+      std::clamp<std::size_t>(kMostBytes / std::max<std::size_t>(bytes, 1), 1, threads);
+  files_.add(most,
+             [&options = options_, stem = folder_ / name, rgba = std::move(rgba), camera,
+              layers = std::move(layers)] { write_files(stem, rgba, camera, layers, options); });
+}
+
 FrameReport write_frames(Tracer& tracer,
                          const Model& model,
                          std::span<const Camera> cameras,
@@ -206,6 +226,7 @@ FrameReport write_frames(Tracer& tracer,
   }
   check_shutter(options);
   const std::vector<std::string> names = frame_names(cameras);
+  FrameWriter writer(folder, options);
   FrameReport report;
   Communicator alone;
   Communicator& ranks = options.bands != nullptr ? *options.bands : alone;
@@ -239,12 +260,13 @@ FrameReport write_frames(Tracer& tracer,
       }
       layers.normals = unit_normals(box_average(sums, options.supersample));
     }
-    write_frame(folder / names[i], box_average(samples.rgba, options.supersample), cameras[i],
-                layers, options);
+    writer.add(names[i], box_average(samples.rgba, options.supersample), cameras[i],
+               std::move(layers));
     ++report.frames;
     if (ranks.all_reduce_or(done && !done(report.frames))) break;
   }
   tracer.set_share(0, 1);
+  writer.finish();
   return report;
 }
 

@@ -14,6 +14,7 @@
 #include "raysplats/image.hpp"
 #include "raysplats/model.hpp"
 #include "raysplats/tracer.hpp"
+#include "util/background_tasks.hpp"
 
 namespace raysplats {
 
@@ -72,14 +73,26 @@ struct FrameLayers {
   Image alpha;    ///< for previews, in the last channel; of the colours where empty
 };
 
-/// Gives a frame to options.video, and where options.files says so writes it: `stem` with the
-/// format's extension, RGB of `rgba` for 8-bit formats, and the layers that options ask for.
-/// `camera` is the frame's. Throws DataError when a file fails.
-void write_frame(const std::filesystem::path& stem,
-                 const Image& rgba,
-                 const Camera& camera,
-                 const FrameLayers& layers,
-                 const FrameOptions& options);
+/// Takes finished frames while the next ones are traced: several are written at once, as
+/// compressing a picture takes a processor as long as tracing it takes all of them, or longer.
+class FrameWriter {
+ public:
+  /// `folder` exists where options.files says that there are files; both outlive the writer.
+  FrameWriter(const std::filesystem::path& folder, const FrameOptions& options)
+      : folder_(folder), options_(options) {}
+
+  /// Gives a frame to options.video, and where options.files says so writes it: `name` with the
+  /// format's extension, RGB of `rgba` for 8-bit formats, and the layers that options ask for.
+  /// `camera` is the frame's. Throws DataError when a file of this or of an earlier frame fails.
+  void add(const std::string& name, Image rgba, const Camera& camera, FrameLayers layers);
+  /// Waits for all files. Throws DataError when one fails.
+  void finish() { files_.finish(); }
+
+ private:
+  const std::filesystem::path& folder_;
+  const FrameOptions& options_;
+  BackgroundTasks files_;
+};
 
 /// Traces every camera and writes its files to `folder`, which exists where there are files. `done`
 /// hears the number of finished frames and returns false to stop early; so does `within` with the

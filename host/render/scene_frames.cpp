@@ -73,6 +73,7 @@ SceneReport write_scene_frames(PathTracer& tracer,
                                const std::function<bool(double)>& within) {
   check_shutter(options);
   const std::vector<std::string> names = frame_names(scene.cameras);
+  FrameWriter writer(folder, options);
   SceneReport report;
   Communicator alone;
   Communicator& ranks = options.bands != nullptr ? *options.bands : alone;
@@ -95,13 +96,14 @@ SceneReport write_scene_frames(PathTracer& tracer,
           break;
         }
       }
-      write_frame(folder / names[i], rgba, scene.cameras[i], layers, options);
+      writer.add(names[i], std::move(rgba), scene.cameras[i], std::move(layers));
       ++report.frames;
     }
     if (ranks.all_reduce_or(done && !done(report.frames))) break;
   }
   tracer.set_share(0, 1);
   tracer.set_sampling(scene.scene.render.samples, scene.scene.render.seed);
+  writer.finish();
   return report;
 }
 
