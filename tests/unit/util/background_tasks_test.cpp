@@ -3,7 +3,6 @@
 
 #include <doctest/doctest.h>
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <future>
@@ -23,7 +22,7 @@ TEST_CASE("background tasks: whoever hands them in goes on, up to the limit") {
       ++done;
     });
   }
-  CHECK(done == 0);  // and yet here
+  CHECK(done == 0);  // add() came back before they ended
   gate.set_value();
   tasks.finish();
   CHECK(done == 2);
