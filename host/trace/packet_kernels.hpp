@@ -42,8 +42,8 @@ class PacketKernels {
   /// What cuts streams into segments before trace_backward_group: list_segments and sum_segments.
   std::array<Kernel, 2> segments(const BuildOptions& build);
 
-  /// A work-item for every block x block packets of whole tiles, or a work-group for every packet of
-  /// a picture that is `width` pixels wide.
+  /// A work-item for every block x block packets of whole tiles, or a work-group for every packet
+  /// of a picture that is `width` pixels wide.
   Range range(const Kernel& kernel, int block, int width, const TileRows& tiles) const;
 
  private:

@@ -20,8 +20,7 @@ CLI::Option* add_row(CLI::App& app,
         row.help);
   }
   const bool list = row.list != OptionRow::List::kNone;
-  CLI::Option* option =
-      app.add_option_function<std::vector<std::string>>(all, set, row.help);
+  CLI::Option* option = app.add_option_function<std::vector<std::string>>(all, set, row.help);
   // One word per use: further ones would swallow the data set's name.
   option->expected(1)->allow_extra_args(false);
   option->type_name(list ? "LIST" : "VALUE");

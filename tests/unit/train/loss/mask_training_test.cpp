@@ -122,5 +122,6 @@ TEST_CASE("a start without a Gaussian because masks leave nothing of the photos 
   } catch (const UsageError& error) {
     message = error.what();
   }
-  CHECK(message.find("masks, areas or transparent pixels leave 0 % of the photos") != std::string::npos);
+  CHECK(message.find("masks, areas or transparent pixels leave 0 % of the photos") !=
+        std::string::npos);
 }
