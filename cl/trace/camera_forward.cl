@@ -24,8 +24,8 @@
 #include "trace/packet_sorted.h"
 #include "trace/packet_state.h"
 
-#ifndef SPREAD
-#define SPREAD 1
+#ifndef STRETCHES
+#define STRETCHES 1
 #endif
 
 // Work-items of a tile.
@@ -33,17 +33,17 @@
 #define DOWN (TILE / (BLOCK * PACKET_HEIGHT))
 
 // Column and row of the work-item's tile in the window. Tiles that are launched one after the other
-// come from SPREAD stretches of the picture in turn: a thread that is given many at once gets some
-// of what is much work and some of what is little.
-uint2 spread_tile(const uint columns) {
+// come from STRETCHES stretches of the picture in turn: a thread that is given many at once gets
+// some of what is much work and some of what is little.
+uint2 tile_in_turn(const uint columns) {
   const uint column = get_global_id(0) / ACROSS, row = get_global_id(1) / DOWN;
-#if SPREAD > 1
-  if (column >= columns) return (uint2)(column, row);
+#if STRETCHES > 1
   const uint first_row = get_global_offset(1) / DOWN;
   const uint tiles = columns * (uint)(get_global_size(1) / DOWN);
   const uint number = (row - first_row) * columns + column;
-  const uint stretch = number % SPREAD;
-  const uint tile = stretch * (tiles / SPREAD) + min(stretch, tiles % SPREAD) + number / SPREAD;
+  const uint stretch = number % STRETCHES;
+  const uint tile =
+      stretch * (tiles / STRETCHES) + min(stretch, tiles % STRETCHES) + number / STRETCHES;
   return (uint2)(tile % columns, first_row + tile / columns);
 #else
   return (uint2)(column, row);
@@ -64,7 +64,7 @@ __kernel void trace_forward(RS_LIST_ARGUMENTS,
                              forward.max_hits};
   const float4 background =
       (float4)(forward.background[0], forward.background[1], forward.background[2], 0.0f);
-  const uint2 at = spread_tile(forward.window[2]);
+  const uint2 at = tile_in_turn(forward.window[2]);
   const int column = at.x, row = at.y;
   if (column >= forward.window[2] || row >= forward.window[3]) return;
   const int block_x =

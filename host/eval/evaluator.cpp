@@ -29,9 +29,6 @@
 namespace raysplats {
 namespace {
 
-/// Pictures that are written at once: a photo and its render each.
-constexpr std::size_t kMostPictures = 4;
-
 struct Comparison {
   Image render;  // RGB in [0, 1]
   Image photo;   // RGB
@@ -323,10 +320,11 @@ class Evaluation {
   std::string picture_of(std::size_t i) const { return names_[i] + ".png"; }
   // Beside the next comparison.
   void write_picture(std::size_t i, const Comparison& pair) {
-    files_.add(kMostPictures,
-               [path = output_ / picture_of(i), both = side_by_side(pair.photo, pair.render)] {
-                 write_image(path, both);
-               });
+    Image both = side_by_side(pair.photo, pair.render);
+    const std::size_t bytes = sizeof(float) * both.data.size();
+    files_.add(bytes, [path = output_ / picture_of(i), both = std::move(both)] {
+      write_image(path, both);
+    });
   }
   // Ranks that render together stop together.
   bool for_all(bool stop) const { return options_.together ? ranks_.all_reduce_or(stop) : stop; }

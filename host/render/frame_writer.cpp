@@ -8,7 +8,6 @@
 #include <map>
 #include <set>
 #include <span>
-#include <thread>
 #include <utility>
 
 #include "comm/communicator.hpp"
@@ -24,9 +23,6 @@ namespace raysplats {
 namespace {
 
 constexpr int kMaxSupersample = 16;
-
-/// Of frames that wait to be written, beside what their compression takes.
-constexpr std::size_t kMostBytes = std::size_t{512} << 20;
 
 /// The folders and the stem of an image name in one word; "." and ".." of relative names vanish.
 std::string joined(const std::filesystem::path& name) {
@@ -205,10 +201,7 @@ void FrameWriter::add(const std::string& name,
   const std::size_t bytes =
       sizeof(float) * (rgba.data.size() + layers.depth.data.size() + layers.normals.data.size() +
                        layers.hits.data.size() + layers.alpha.data.size());
-  const std::size_t threads = std::max(1u, std::thread::hardware_concurrency());
-  const std::size_t most =
-      std::clamp<std::size_t>(kMostBytes / std::max<std::size_t>(bytes, 1), 1, threads);
-  files_.add(most,
+  files_.add(bytes,
              [&options = options_, stem = folder_ / name, rgba = std::move(rgba), camera,
               layers = std::move(layers)] { write_files(stem, rgba, camera, layers, options); });
 }

@@ -33,7 +33,7 @@ std::vector<Kernel> PacketKernels::forward(const BuildOptions& build) {
   BuildOptions own = build;
   own.define("BLOCK", layout_.block)
       .define("PENDING", layout_.pending)
-      .define("SPREAD", layout_.stretches);
+      .define("STRETCHES", layout_.stretches);
   return {context_.kernel("trace/camera_forward.cl", "trace_forward", own)};
 }
 

@@ -15,9 +15,9 @@ TEST_CASE("background tasks: whoever hands them in goes on, up to the limit") {
   std::promise<void> gate;
   const std::shared_future<void> opened(gate.get_future());
   std::atomic<int> done = 0;
-  BackgroundTasks tasks;
+  BackgroundTasks tasks(2);
   for (int i = 0; i < 2; ++i) {
-    tasks.add(2, [&] {
+    tasks.add(0, [&] {
       opened.wait();
       ++done;
     });
@@ -29,11 +29,10 @@ TEST_CASE("background tasks: whoever hands them in goes on, up to the limit") {
 }
 
 TEST_CASE("background tasks: no more run at once than asked for, and all run") {
-  std::atomic<int> running = 0, most = 0, done = 0;
-  {
-    BackgroundTasks tasks;
+  const auto most_at_once = [](BackgroundTasks tasks, std::size_t bytes) {
+    std::atomic<int> running = 0, most = 0, done = 0;
     for (int i = 0; i < 40; ++i) {
-      tasks.add(3, [&] {
+      tasks.add(bytes, [&] {
         const int now = ++running;
         for (int seen = most; seen < now && !most.compare_exchange_weak(seen, now);) {
         }
@@ -42,19 +41,23 @@ TEST_CASE("background tasks: no more run at once than asked for, and all run") {
         ++done;
       });
     }
-  }
-  CHECK(done == 40);
-  CHECK(most <= 3);
+    tasks.finish();
+    CHECK(done == 40);
+    return most.load();
+  };
+  CHECK(most_at_once(BackgroundTasks(3), 1) <= 3);
+  CHECK(most_at_once(BackgroundTasks(8, 25), 10) <= 2);
+  CHECK(most_at_once(BackgroundTasks(8, 25), 100) == 1);
 }
 
 TEST_CASE("background tasks: what one throws reaches who hands in another, or waits") {
   const auto fail = [] { throw std::runtime_error("disk full"); };
-  BackgroundTasks tasks;
-  tasks.add(1, fail);
+  BackgroundTasks tasks(1);
+  tasks.add(0, fail);
   bool started = false;
-  CHECK_THROWS_WITH_AS(tasks.add(1, [&] { started = true; }), "disk full", std::runtime_error);
+  CHECK_THROWS_WITH_AS(tasks.add(0, [&] { started = true; }), "disk full", std::runtime_error);
   CHECK_FALSE(started);
-  tasks.add(1, fail);
+  tasks.add(0, fail);
   CHECK_THROWS_WITH_AS(tasks.finish(), "disk full", std::runtime_error);
   tasks.finish();
 }
