@@ -6,6 +6,13 @@
 
 namespace raysplats {
 
+/// What pixels show that tell no depth, as of skies and white walls, may be anywhere from the
+/// typical distance to a thousand times that, where the sky no longer moves with the cameras: the
+/// distance at that share of the way, evenly by the logarithm.
+inline double unknown_depth(double typical, double share) {
+  return typical * std::pow(1000.0, share);
+}
+
 /// Where a sweep looks, as distances from the cameras.
 struct DepthRange {
   double nearest = 0;

@@ -24,6 +24,7 @@
 #include "train/start/plane_sweep.hpp"
 #include "train/start/point_check.hpp"
 #include "train/start/point_cloud.hpp"
+#include "train/start/point_cover.hpp"
 #include "train/start/pose_check.hpp"
 #include "train/start/sparse_start.hpp"
 #include "util/file_kind.hpp"

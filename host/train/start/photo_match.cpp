@@ -24,8 +24,9 @@ constexpr double kClear = 0.5;          // and the best depth's share of the med
 constexpr double kUnique = 0.7;         // and of the best one elsewhere: patterns repeat
 constexpr double kRounding = 1e-5;      // a difference that 8 bits make of none
 constexpr std::size_t kElsewhere = 8;   // steps from the best depth
+constexpr double kSamePlace = 1.0;      // pixels in other photos: what is far moves by less a step
 constexpr double kMostStretched = 8.0;  // pixels that one spans elsewhere: more is a picture's seam
-constexpr double kSameDepth = 3.1;      // steps, from which another photo finds it
+constexpr double kSameDepth = 3.1;      // steps, from which another photo finds it, or kSamePlace
 constexpr std::size_t kWitnesses = 2;   // photos that are asked for it
 
 struct Patch {
@@ -174,6 +175,26 @@ DepthSteps steps_of(std::span<const SmallPhoto> photos,
   return out;
 }
 
+// The costs of the steps that are not where the best one is, nor next to it.
+std::vector<double> costs_elsewhere(std::span<const SmallPhoto> photos,
+                                    std::span<const std::size_t> neighbours,
+                                    const PhotoPixel& pixel,
+                                    const DepthSteps& steps,
+                                    const std::vector<double>& costs) {
+  const std::size_t best = best_step(costs);
+  const glm::dvec3 found = point_on(pixel.ray, steps.at(best));
+  const auto same_place = [&](std::size_t step) {
+    return apart(photos, neighbours, found, point_on(pixel.ray, steps.at(step))) < kSamePlace;
+  };
+  std::size_t begin = best - std::min(best, kElsewhere);
+  std::size_t end = std::min(best + kElsewhere + 1, costs.size());
+  while (begin > 0 && same_place(begin - 1)) --begin;
+  while (end < costs.size() && same_place(end)) ++end;
+  std::vector<double> out(costs.begin(), costs.begin() + static_cast<std::ptrdiff_t>(begin));
+  out.insert(out.end(), costs.begin() + static_cast<std::ptrdiff_t>(end), costs.end());
+  return out;
+}
+
 // A depth at which photos agree, and how far apart those are that they were asked for.
 struct AgreedDepth {
   double depth = 0;
@@ -188,14 +209,14 @@ std::optional<AgreedDepth> agreed_depth(std::span<const SmallPhoto> photos,
   const DepthSteps steps = steps_of(photos, neighbours, pixel, depths);
   const std::vector<double> costs =
       match_costs(photos, neighbours, pixel, steps.depths, steps.count);
-  const std::optional<double> middle = known_cost(costs, 0.5);
-  if (!middle) return std::nullopt;
+  if (!known_cost(costs, 0.5)) return std::nullopt;
   const std::size_t best = best_step(costs);
-  if (!agrees(costs[best], *middle)) return std::nullopt;
-  for (std::size_t step = 0; step < costs.size(); ++step) {
-    const bool elsewhere = step + kElsewhere < best || step > best + kElsewhere;
-    const bool as_good = costs[best] + kRounding > kUnique * (costs[step] + kRounding);
-    if (elsewhere && costs[step] >= 0 && as_good) return std::nullopt;
+  const std::vector<double> elsewhere = costs_elsewhere(photos, neighbours, pixel, steps, costs);
+  const std::optional<double> middle = known_cost(elsewhere, 0.5);
+  if (!middle || !agrees(costs[best], *middle)) return std::nullopt;
+  for (const double cost : elsewhere) {
+    const bool as_good = costs[best] + kRounding > kUnique * (cost + kRounding);
+    if (cost >= 0 && as_good) return std::nullopt;
   }
   return AgreedDepth{steps.at(best), steps.log_step()};
 }
@@ -216,8 +237,12 @@ bool confirmed(std::span<const SmallPhoto> photos,
     if (!other.shows()) continue;
     const auto found = agreed_depth(photos, neighbours[i], other, depths);
     const double there = glm::distance(world, other.ray.origin);
-    if (found && std::abs(std::log(found->depth / there)) < kSameDepth * found->log_step)
-      return true;
+    const auto tells_it = [&](const AgreedDepth& depth_there) {
+      const double steps = std::abs(std::log(depth_there.depth / there)) / depth_there.log_step;
+      return steps < kSameDepth || apart(photos, neighbours[i], world,
+                                         point_on(other.ray, depth_there.depth)) < kSamePlace;
+    };
+    if (found && tells_it(*found)) return true;
     if (++asked == kWitnesses) return false;
   }
   return false;

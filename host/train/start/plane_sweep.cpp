@@ -105,9 +105,11 @@ std::vector<std::size_t> neighbours_of(std::span<const Pose> poses,
 // A shell beyond that depth, and what may stand before it.
 DepthRange open_range(double depth) { return {depth / kFarthest, 2.0 * depth, 3.0 * depth, true}; }
 
-// Where in the range what has no clear depth begins: about the typical depth.
-double unsure_share(const DepthRange& depths) {
-  return std::log(depths.typical / depths.nearest) / std::log(depths.farthest / depths.nearest);
+// How far away a pixel may be that has no clear depth.
+double unclear_depth(const DepthRange& depths, double share) {
+  const double most = depths.farthest / depths.typical;
+  return depths.open ? depths.typical * std::pow(most, share)
+                     : unknown_depth(depths.typical, share);
 }
 
 struct Sample {
@@ -126,12 +128,12 @@ Sample sweep_pixel(std::span<const SmallPhoto> photos,
                    std::size_t index) {
   CounterRng rng(seed, stream, 8 * index);
   const PhotoPixel pixel = random_pixel(photos, rng);
-  const double jitter = rng.uniform();
+  const double share = rng.uniform();
   Sample out{pixel};
   if (!pixel.shows()) return out;
   const auto depth = confirmed_depth(photos, neighbours, pixel, depths);
   out.agreed = depth.has_value();
-  out.depth = depth ? *depth : depths.at(jitter + (1.0 - jitter) * unsure_share(depths));
+  out.depth = depth ? *depth : unclear_depth(depths, share);
   return out;
 }
 

@@ -13,6 +13,7 @@
 
 #include "scene/camera/camera_model.hpp"
 #include "scene/even_choice.hpp"
+#include "train/start/photo_cells.hpp"
 #include "train/start/point_cloud.hpp"
 #include "util/parallel.hpp"
 
@@ -28,61 +29,11 @@ constexpr double kClearlyBetter = 0.6;      // at another scale
 constexpr std::size_t kFewerLooks = 500;    // at every scale
 constexpr int kScaleSteps = 20;             // of half an octave, up and down
 constexpr float kOneColor = 0.004f;         // no two of 256 steps apart
-constexpr std::size_t kMostPlaces = 20000;  // of points that fill cells, or hide others
+constexpr std::size_t kMostPlaces = 20000;  // of points that hide others
 constexpr std::size_t kFewerPlaces = 2000;  // at every scale
 constexpr int kNearCell = 10;               // pixels a side of what is near a point
-constexpr int kBareCells = 7;               // along a photo's longer side
-constexpr float kLeastStep = 12.0f / 255;   // between the neighbours of a pixel at an edge
-constexpr double kLeastEdges = 0.05;        // of the pixels of a cell that has texture
 constexpr double kBehind = 1.15;            // times as far as the nearest in a cell: hidden
 constexpr double kEvenColors = 1e-4;        // squared difference of points that tell nothing
-
-glm::dvec3 triple(const std::vector<float>& values, std::size_t i) {
-  return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
-}
-
-// Square cells of a photo, as far as they lie inside.
-class Cells {
- public:
-  Cells(const SmallPhoto& photo, int side)
-      : side_(side),
-        columns_((photo.camera.width + side - 1) / side),
-        rows_((photo.camera.height + side - 1) / side) {}
-
-  std::size_t count() const {
-    return static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
-  }
-
-  /// The one that contains the image point, which has to lie inside.
-  std::size_t at(const glm::dvec2& place) const {
-    const auto along = [this](double x, int cells) {
-      return static_cast<std::size_t>(std::min(static_cast<int>(x) / side_, cells - 1));
-    };
-    return along(place.y, rows_) * static_cast<std::size_t>(columns_) + along(place.x, columns_);
-  }
-
- private:
-  int side_, columns_, rows_;
-};
-
-// Which cells of a photo show points.
-class PointCells {
- public:
-  PointCells(const PointCloud& points, const SmallPhoto& photo, int side)
-      : cells_(photo, side), taken_(cells_.count()) {
-    for (const std::size_t i : even_choice(points.size(), kMostPlaces)) {
-      const auto place = photo.sees(triple(points.positions, i));
-      if (place) taken_[cells_.at(*place)] = true;
-    }
-  }
-
-  /// Whether the cell that contains the image point shows one; the point has to lie inside.
-  bool taken(const glm::dvec2& place) const { return taken_[cells_.at(place)]; }
-
- private:
-  Cells cells_;
-  std::vector<bool> taken_;
-};
 
 // A photo, and how far away the nearest of `looks` of the points is in each of its cells: those of
 // a scan lie on all sides of things, and a photo shows what is before them.
@@ -120,32 +71,9 @@ class PhotoBeforePoints {
   }
 
   const SmallPhoto* photo_;
-  Cells cells_;
+  PhotoCells cells_;
   std::vector<double> nearest_;
 };
-
-// Whether the square around the middle has edges that points can be found at; a white wall has
-// none.
-bool is_textured(const SmallPhoto& photo, const glm::dvec2& middle, int side) {
-  const int left = std::max(1, static_cast<int>(middle.x) - side / 2);
-  const int top = std::max(1, static_cast<int>(middle.y) - side / 2);
-  const int right = std::min(left + side, photo.camera.width - 1);
-  const int bottom = std::min(top + side, photo.camera.height - 1);
-  std::size_t pixels = 0, edges = 0;
-  for (int y = top; y < bottom; ++y) {
-    for (int x = left; x < right; ++x) {
-      glm::vec2 step(0.0f);
-      for (std::size_t c = 0; c < 3; ++c) {
-        step.x += photo.color(x + 1, y)[c] - photo.color(x - 1, y)[c];
-        step.y += photo.color(x, y + 1)[c] - photo.color(x, y - 1)[c];
-      }
-      ++pixels;
-      edges += glm::length(step) >= 3 * kLeastStep ? 1 : 0;
-    }
-  }
-  return static_cast<double>(edges) >=
-         kLeastEdges * static_cast<double>(std::max<std::size_t>(pixels, 1));
-}
 
 // Mean of the lower half, of two at least: something may hide the point from the others.
 double better_half(std::vector<double>& differences) {
@@ -273,49 +201,6 @@ PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> phot
     }
   }
   return points;
-}
-
-double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos) {
-  struct Count {
-    std::size_t shown = 0, bare = 0;
-  };
-  Count textured, even;
-  for (const SmallPhoto& photo : photos) {
-    const int width = photo.camera.width, height = photo.camera.height;
-    const int side = std::max(1, std::max(width, height) / kBareCells);
-    const PointCells cells(points, photo, side);
-    for (double y = 0.5 * std::min(side, height); y < height; y += side) {
-      for (double x = 0.5 * std::min(side, width); x < width; x += side) {
-        const glm::dvec2 middle(x, y);
-        if (!photo.known(middle) || photo.at(middle).w < 0.5) continue;
-        Count& count = is_textured(photo, middle, side) ? textured : even;
-        ++count.shown;
-        count.bare += cells.taken(middle) ? 0 : 1;
-      }
-    }
-  }
-  // Photos without any texture tell no more than where points are.
-  const auto [shown, bare] = textured.shown > 0 ? textured : even;
-  return shown > 0 ? static_cast<double>(bare) / static_cast<double>(shown) : 0;
-}
-
-PointCloud beside_points(const PointCloud& found,
-                         const PointCloud& points,
-                         std::span<const SmallPhoto> photos) {
-  std::vector<PointCells> cells;
-  for (const SmallPhoto& photo : photos) cells.emplace_back(points, photo, kNearCell);
-  PointCloud out;
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    std::size_t seen = 0, taken = 0;
-    for (std::size_t k = 0; k < photos.size(); ++k) {
-      const auto place = photos[k].sees(triple(found.positions, i));
-      if (!place) continue;
-      ++seen;
-      taken += cells[k].taken(*place) ? 1 : 0;
-    }
-    if (seen > 0 && 2 * taken >= seen) append_point(found, i, out);
-  }
-  return out;
 }
 
 bool plausible(const PointMatch& match) {

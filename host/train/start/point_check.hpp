@@ -43,17 +43,6 @@ bool colorless(const PointCloud& points);
 /// The points in the colours in which photos show them: of each the median, grey where none does.
 PointCloud colored_by_photos(PointCloud points, std::span<const SmallPhoto> photos);
 
-/// The share of what the photos show that lies in wide places without a point: square cells of a
-/// seventh of a photo's longer side, but for those that are transparent, masked out or without
-/// texture, as on white walls, where no point can be found. 0 where nothing is shown.
-double bare_share(const PointCloud& points, std::span<const SmallPhoto> photos);
-
-/// The points of `found` that lie near others: in cells of 10 pixels a side that show some of
-/// `points`, in at least half of the photos that see them. Without their tracks and errors.
-PointCloud beside_points(const PointCloud& found,
-                         const PointCloud& points,
-                         std::span<const SmallPhoto> photos);
-
 /// Whether points can be where they are: not when they are in other units or axes than the cameras.
 bool plausible(const PointMatch& match);
 

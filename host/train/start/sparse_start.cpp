@@ -18,6 +18,7 @@
 #include "train/start/plane_sweep.hpp"
 #include "train/start/point_check.hpp"
 #include "train/start/point_cloud.hpp"
+#include "train/start/point_cover.hpp"
 
 namespace raysplats {
 namespace {
@@ -173,6 +174,23 @@ PointCloud start_points(const Dataset& dataset,
   return colored_by_photos(std::move(points), photos(PhotoChoice::kSome));
 }
 
+// Adds points where no sparse ones are, as in skies and on white walls, a fifth as many as there
+// are if these were nowhere. A body that is cut out, or within bounds, has nothing around it.
+void add_uncovered(const PointCloud& sparse,
+                   const Dataset& dataset,
+                   std::span<const Camera> cameras,
+                   const PhotoSource& photos,
+                   const TrainOptions& options,
+                   PointCloud& points) {
+  constexpr double kShare = 0.2;
+  if (options.init != "auto" || dataset.alpha_is_background || options.bounds) return;
+  const PointCloud found =
+      uncovered_points(sparse, photos(PhotoChoice::kSome), typical_depth(cameras, dataset.points),
+                       share_of(points.size(), kShare), options.seed);
+  spdlog::debug("{} points of the start stand where there are no sparse ones", found.size());
+  for (std::size_t i = 0; i < found.size(); ++i) append_point(found, i, points);
+}
+
 }  // namespace
 
 SparseStart sparse_start(const Dataset& dataset,
@@ -198,10 +216,11 @@ SparseStart sparse_start(const Dataset& dataset,
         "(--max-gaussians)",
         most, out.points.size(), limit);
   }
+  out.sparse = out.points;
   // Sizes follow from the distances between the points that are left.
   if (options.init == "colmap" || (alone && out.points.size() > 0 &&
                                    out.points.size() >= std::min(kFewPoints, out.count / 2))) {
-    out.points = subset(out.points, most);
+    out.points = subset(out.sparse, most);
     out.enough = true;
   } else if (!alone) {
     spdlog::info("{}: the start takes {} points from the photos as well",
@@ -209,12 +228,14 @@ SparseStart sparse_start(const Dataset& dataset,
                      ? "the sparse points lie on a part of what the photos show"
                      : "most of what the photos show tells its depth",
                  out.count);
-    out.sparse = out.points;
-    out.points = subset(out.points, most);
+    out.points = subset(out.sparse, most);
   } else if (out.points.size() > 0) {
     spdlog::info("{} sparse points are few: the start takes {} points from the photos as well",
                  out.points.size(), out.count);
   }
+  // Of the points that photos give everywhere some stand there already.
+  if (out.enough || in_their_places)
+    add_uncovered(out.sparse, dataset, cameras, photos, options, out.points);
   return out;
 }
 

@@ -312,6 +312,55 @@ TEST_CASE("what lies far beyond what most pixels show is found as well") {
   CHECK(background_points(one, swept_depths(one, 3.0, 3), 400, 3).size() == 0);
 }
 
+TEST_CASE("what is so far away that its depth moves no pixel is found at some such depth") {
+  // A step of a tenth at the wall's distance moves it by a seventh of a pixel in the next photo.
+  const auto far_wall = [](const CameraRay& ray) {
+    const glm::dvec3 p = (ray.origin + 400.0 / ray.direction.x * ray.direction) / 100.0;
+    return wall({{0, 0, 0}, p / 4.0, true});
+  };
+  std::vector<SmallPhoto> photos;
+  for (int i = 0; i < 13; ++i) {
+    const glm::dvec3 eye(0, 1.2 * (i - 6), 0.3 * (i % 3 - 1));
+    photos.push_back(
+        photo_of(look_at(eye, eye + glm::dvec3(1, 0, 0), {0, 0, 1}, 96, 72, 80), far_wall));
+  }
+  const DepthRange depths{4.0, 40.0, 800.0};
+  const SweptPoints found = probe_sweep(photos, depths, 3);
+  MESSAGE(found.agreed << " agrees");
+  CHECK(found.agreed > 0.5);
+  // Six metres of cameras beside each other tell 400 from 200 by 1.2 pixels.
+  std::size_t far = 0;
+  for (std::size_t i = 0; i < found.points.size(); ++i)
+    far += found.points.positions[3 * i] > 150.0f ? 1 : 0;
+  CHECK(far > found.points.size() * 9 / 10);
+}
+
+TEST_CASE("what has no clear depth may be up to a thousand times as far as what most see") {
+  // Photos of one colour, in which no depth is clear.
+  std::vector<SmallPhoto> photos = photos_of_wall();
+  for (SmallPhoto& photo : photos)
+    photo = photo_of(photo.camera, [](const CameraRay&) { return glm::dvec4(0.5); });
+  const DepthRange depths = depths_around(4.0);
+  const PointCloud points = swept_points(photos, depths, 400, 1.0, 5).points;
+  REQUIRE(points.size() == 400);
+  std::size_t near = 0, far = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    const double distance = glm::length(glm::dvec3(p[0], p[1], p[2]));
+    CHECK(distance > 3.0);
+    CHECK(distance < 4001.0);
+    near += distance < 40.0 ? 1 : 0;
+    far += distance > 400.0 ? 1 : 0;
+  }
+  // Evenly by the logarithm: a third of them each.
+  CHECK(near > 90);
+  CHECK(far > 90);
+  // Beyond the far end of an open range nothing stands.
+  const DepthRange open{0.4, 8.0, 12.0, true};
+  const PointCloud shell = swept_points(photos, open, 400, 1.0, 5).points;
+  for (std::size_t i = 0; i < shell.size(); ++i) CHECK(shell.positions[3 * i] < 12.1f);
+}
+
 TEST_CASE("cameras turned at arm's length find what is around them") {
   // Their axes meet where the one who turns stands, which tells nothing of what they look at.
   const auto room = [](const CameraRay& ray) { return ball(ray, 2.5); };

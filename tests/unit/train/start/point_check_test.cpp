@@ -12,6 +12,7 @@
 #include "train/start/photo_start.hpp"
 #include "train/start/plane_sweep.hpp"
 #include "train/start/point_cloud.hpp"
+#include "train/start/point_cover.hpp"
 #include "unit/train/test_photos.hpp"
 #include "util/rng.hpp"
 
@@ -251,7 +252,8 @@ TEST_CASE("points of photos that tell of depth stand beside sparse ones, in thei
   };
   CHECK(added(most, "colmap").size() == 0);
   CHECK(added(most, "auto").size() > 200);
-  CHECK(count_above(1.4, added(most, "auto")) < 15);
+  // But for the few where there are no sparse ones (point_cover_test.cpp).
+  CHECK(count_above(1.4, added(most, "auto")) < 30);
   // Much of what the photos tell of has no sparse points at all: they are of another part.
   const PointCloud half = points_below(0.4);
   CHECK(bare_share(half, photos) < 0.3);
