@@ -171,6 +171,17 @@ void warn_of_losses(const Gaussians& model, int bits, const std::filesystem::pat
         "the model up, as by convert --scale {:g}",
         path.string(), small, sizes.size(), std::max(larger, 10.0));
   }
+  const auto large =
+      std::count_if(sizes.begin(), sizes.end(), [](float s) { return s > kSpzMostLogScale; });
+  // Skies are of few, but large ones.
+  if (1000 * static_cast<std::size_t>(large) > sizes.size()) {
+    const float largest = *std::max_element(sizes.begin(), sizes.end());
+    const double limit = std::exp(static_cast<double>(kSpzMostLogScale - largest));
+    spdlog::warn(
+        "{}: {} of {} Gaussians are larger than SPZ can say (380) and become as small, so that "
+        "skies and what is far away have holes: scale the model down, as by convert --scale {:g}",
+        path.string(), large, sizes.size(), std::pow(10.0, std::floor(std::log10(limit))));
+  }
   if (std::ldexp(1.0, -bits) > size) {
     spdlog::warn(
         "{}: SPZ keeps positions to {:g}, which is more than half of the Gaussians are large, "

@@ -237,6 +237,23 @@ TEST_CASE("SPZ: scenes in tiny units get finer steps, and what is too small is t
   CHECK(told == "crop");
 }
 
+TEST_CASE("SPZ: a sky of Gaussians that are too large is told") {
+  const Scratch scratch;
+  Gaussians model = trained_like(200, 0);
+  const auto told = [&](double sky, const std::string& what) {
+    for (std::size_t i = 0; i < 15; ++i) model.log_scales[i] = static_cast<float>(std::log(sky));
+    const LogCapture log;
+    write_model(scratch / "a.spz", model);
+    return log.contains(what);
+  };
+  CHECK(!told(370.0, "warning"));
+  CHECK(told(2000.0, "5 of 200 Gaussians are larger"));
+  CHECK(told(2000.0, "convert --scale 0.1"));
+  // What is told helps.
+  for (float& s : model.log_scales) s += static_cast<float>(std::log(0.1));
+  CHECK(!told(200.0, "warning"));
+}
+
 TEST_CASE("SPZ: all of a model that lies far away is told to be moved") {
   const Scratch scratch;
   Gaussians model = trained_like(50, 0);
