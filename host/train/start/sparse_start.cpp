@@ -184,9 +184,10 @@ void add_uncovered(const PointCloud& sparse,
                    PointCloud& points) {
   constexpr double kShare = 0.2;
   if (options.init != "auto" || dataset.alpha_is_background || options.bounds) return;
+  const auto looks = static_cast<std::size_t>(kShare * static_cast<double>(points.size()));
   const PointCloud found =
       uncovered_points(sparse, photos(PhotoChoice::kSome), typical_depth(cameras, dataset.points),
-                       share_of(points.size(), kShare), options.seed);
+                       looks, options.seed);
   spdlog::debug("{} points of the start stand where there are no sparse ones", found.size());
   for (std::size_t i = 0; i < found.size(); ++i) append_point(found, i, points);
 }
