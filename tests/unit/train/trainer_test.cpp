@@ -134,7 +134,7 @@ TEST_CASE("a resumed run ends with the bytes of an uninterrupted one") {
 TEST_CASE("rays that reach the cap on hits are counted over the whole run, resumed ones included") {
   Photos photos;
   TrainOptions options = small_options();
-  options.trace.max_hits = 25;
+  options.trace.max_hits = 5;
   options.trace.deterministic = true;  // two runs of atomic sums cap other rays
   const auto metrics_of = [](const std::filesystem::path& run) {
     return nlohmann::json::parse(std::ifstream(run / "metrics.json"));
@@ -261,8 +261,10 @@ TEST_CASE("training leaves the files of a run") {
   CHECK(metrics.at("most_gaussians") == options.max_gaussians);
   CHECK(metrics.at("seed") == options.seed);
   CHECK(!metrics.at("data").get<std::string>().empty());
-  // Steps 16, 48, 80 and so on are timed.
-  CHECK(metrics.at("timed_steps") == 8);
+  // Steps 16, 48, 80 and so on are timed, and once more where one is made again.
+  const std::int64_t timed = metrics.at("timed_steps");
+  CHECK(timed >= 8);
+  CHECK(timed <= 10);
   double share = 0.0;
   std::int64_t steps = 0;
   for (const nlohmann::json& kernel : metrics.at("kernels")) {
@@ -270,7 +272,7 @@ TEST_CASE("training leaves the files of a run") {
     if (kernel.at("name") == "guard_close") steps = kernel.at("calls");
   }
   CHECK(share == doctest::Approx(1.0));
-  CHECK(steps == 8);
+  CHECK(steps == timed);
   CHECK(metrics.at("photos").at(0).at("psnr") > 10.0);
   CHECK(metrics.at("command") == "train '\xEF\xBF\xBD'");  // what is no UTF-8 is replaced
   std::ifstream model(folder / "point_cloud/iteration_250/point_cloud.ply", std::ios::binary);
