@@ -2,11 +2,9 @@
 #include "train/start/point_cover.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
-#include <utility>
 #include <vector>
 
 #include "scene/even_choice.hpp"

@@ -183,7 +183,8 @@ void add_uncovered(const PointCloud& sparse,
                    const TrainOptions& options,
                    PointCloud& points) {
   constexpr double kShare = 0.2;
-  if (options.init != "auto" || dataset.alpha_is_background || options.bounds) return;
+  const bool wanted = options.init == "auto" && options.photo_points;
+  if (!wanted || dataset.alpha_is_background || options.bounds) return;
   const auto looks = static_cast<std::size_t>(kShare * static_cast<double>(points.size()));
   const PointCloud found =
       uncovered_points(sparse, photos(PhotoChoice::kSome), typical_depth(cameras, dataset.points),

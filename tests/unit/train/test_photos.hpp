@@ -10,6 +10,8 @@
 
 #include "scene/camera/camera_model.hpp"
 #include "train/start/photo_set.hpp"
+#include "train/start/point_cloud.hpp"
+#include "util/rng.hpp"
 
 namespace raysplats::test {
 
@@ -63,6 +65,17 @@ inline glm::dvec4 wall(const CameraRay& ray) {
   return {0.5 + 0.4 * std::sin(3.1 * p.y + 0.7 * p.z) * std::sin(1.3 * p.z),
           0.5 + 0.4 * std::cos(2.3 * p.z - 1.1 * p.y), 0.5 + 0.4 * std::sin(4.7 * p.y - 2.9 * p.z),
           1.0};
+}
+
+/// 4000 points on the wall, with its colours, wherever it is lower than `top`.
+inline PointCloud points_below(double top) {
+  CounterRng rng(4, 1);
+  PointCloud out;
+  while (out.size() < 4000) {
+    const glm::dvec3 p(4.0, 6.0 * rng.uniform() - 3.0, 6.0 * rng.uniform() - 3.0);
+    if (p.z < top) append_point(out, p, glm::dvec3(wall({{0, 0, 0}, p / 4.0, true})));
+  }
+  return out;
 }
 
 /// Photos of the wall from nine places before it.
