@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <initializer_list>
 #include <map>
@@ -174,6 +175,15 @@ void check_report(const DeviceReport& report, const std::string& file) {
                                 report.device.name, fmt::join(troubles, " and "), file));
 }
 
+/// Throws where a row failed; what could be measured is told already.
+void check_rows(const BenchReport& report) {
+  const auto failed = std::count_if(report.left_out.begin(), report.left_out.end(),
+                                    [](const BenchReport::LeftOut& row) { return row.failed; });
+  if (failed == 0) return;
+  throw DeviceError(fmt::format("The device {} fails in {} of what is measured, named as left out",
+                                report.device, counted(static_cast<double>(failed), "part")));
+}
+
 void run(const CLI::App& command, const Options& options) {
   check_used(command, options);
   check_alone(command, options);
@@ -230,6 +240,7 @@ void run(const CLI::App& command, const Options& options) {
     fmt::print("{}", forecast_text(make_forecast(context, bench, chosen)));
     return;
   }
+  bench.keep_failures = true;
   const BenchReport report = run_bench(context, bench, chosen);
   // First, so that no trouble with standard output loses it.
   if (!options.json.empty()) write_text_file(options.json, bench_json(report));
@@ -237,6 +248,7 @@ void run(const CLI::App& command, const Options& options) {
   if (!options.html.empty()) write_text_file(options.html, bench_page(report));
   fmt::print("{}", bench_table(report));
   if (options.device.profile) fmt::print("{}", context.profile_table());
+  check_rows(report);
 }
 
 void compare(const CompareOptions& options) {

@@ -33,7 +33,7 @@ void keep_going(const BenchOptions& options,
                 BenchReport& report,
                 const std::function<void()>& work) {
   if (!options.keep_failures) return work();
-  const std::string failure = failure_of(work);
+  const std::string failure = failure_of(work).reason;
   if (!failure.empty()) report.left_out.push_back({id, failure, true});
 }
 
@@ -43,8 +43,8 @@ void add_row(const BenchStage& stage,
              const BenchOptions& options,
              BenchReport& report) {
   const std::string id = id_of(stage.name, model.name, model.gaussians.size());
-  if (!samples.failure.empty()) {
-    report.left_out.push_back({id, samples.failure, true});
+  if (!samples.failure.reason.empty()) {
+    report.left_out.push_back({id, samples.failure.reason, true});
   } else if (samples.seconds.empty()) {
     report.left_out.push_back({id, samples.lacking.empty() ? kNoTime : samples.lacking});
   } else {
@@ -55,7 +55,7 @@ void add_row(const BenchStage& stage,
 }
 
 // Measures the operations from number `first` on. Where one fails and that is kept, the number of
-// the next one.
+// the next one, or its own where memory did not suffice beside what those before it hold.
 std::optional<std::size_t> measure_from(std::size_t first,
                                         Context& context,
                                         const BenchModel& model,
@@ -73,9 +73,12 @@ std::optional<std::size_t> measure_from(std::size_t first,
   const auto samples = run_operations(context, operations, options.repeat, options.min_seconds,
                                       out_of_time, options.keep_failures);
   for (std::size_t i = 0; i < operations.size(); ++i) {
+    const KeptFailure& failure = samples[i].front().failure;
+    // Alone it may fit.
+    if (failure.of_memory && i > 0) return first + i;
     for (std::size_t k = 0; k < operations[i].stages.size(); ++k)
       add_row(operations[i].stages[k], samples[i][k], model, options, report);
-    if (!samples[i].front().failure.empty()) return first + i + 1;
+    if (!failure.reason.empty()) return first + i + 1;
   }
   return std::nullopt;
 }

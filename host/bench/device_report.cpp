@@ -53,12 +53,13 @@ void add_speeds(const BenchReport& run, int width, int height, DeviceReport& rep
 // Counted by kernels of its own, which not every device can run.
 void add_model(Context& context, const BenchOptions& one, DeviceReport& report) {
   const BenchCase scene{one.scenes.front(), one.sizes.front()};
-  const std::string failure = failure_of([&] {
-    const BenchModel model = generated(scene, one);
-    SceneBench bench(context, model, one);
-    report.models.push_back(
-        {scene.scene, scene.size, one.width, one.height, forecast_cards(bench.counts(true))});
-  });
+  const std::string failure =
+      failure_of([&] {
+        const BenchModel model = generated(scene, one);
+        SceneBench bench(context, model, one);
+        report.models.push_back(
+            {scene.scene, scene.size, one.width, one.height, forecast_cards(bench.counts(true))});
+      }).reason;
   if (failure.empty()) return;
   report.left_out.push_back(
       fmt::format("the model of speed of {}, {} Gaussians: {}", scene.scene, scene.size, failure));
@@ -66,7 +67,8 @@ void add_model(Context& context, const BenchOptions& one, DeviceReport& report) 
 
 // Measures one scene of one size. False where nothing of it could be.
 bool add_run(Context& context, const BenchOptions& one, DeviceReport& report) {
-  const std::string failure = failure_of([&] { report.runs.push_back(run_bench(context, one)); });
+  const std::string failure =
+      failure_of([&] { report.runs.push_back(run_bench(context, one)); }).reason;
   if (!failure.empty()) {
     report.left_out.push_back(fmt::format("{}, {} Gaussians, {}x{}: {}", one.scenes.front(),
                                           one.sizes.front(), one.width, one.height, failure));

@@ -75,6 +75,7 @@ void SceneBench::Impl::make_light_tracer(std::size_t triangles,
     }
     scene.lights = {light};
   }
+  light_tracer.reset();  // two do not fit where one does
   light_tracer = std::make_unique<PathTracer>(context, scene);
 }
 

@@ -8,7 +8,6 @@
 #include <chrono>
 #include <exception>
 
-#include "bench/kept_failure.hpp"
 #include "raysplats/error.hpp"
 #include "util/clock.hpp"
 
@@ -151,7 +150,7 @@ std::vector<std::vector<StageSamples>> run_operations(Context& context,
   Collector collector(operations);
   benchmark::RunSpecifiedBenchmarks(&collector, "all");
   benchmark::ClearRegisteredBenchmarks();
-  std::string kept;
+  KeptFailure kept;
   if (failure && keep_failures) {
     kept = failure_of([&] { std::rethrow_exception(failure); });
   } else if (failure) {

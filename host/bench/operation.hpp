@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/kept_failure.hpp"
 #include "bench/report.hpp"
 #include "device/context.hpp"
 
@@ -37,7 +38,7 @@ struct StageSamples {
   std::vector<double> seconds;  ///< one per repetition, by the stage's clock
   std::vector<double> wall;     ///< of the whole operation
   std::string lacking;          ///< why the device left it out, where it did
-  std::string failure;          ///< what it threw, where that is kept
+  KeptFailure failure;          ///< what it threw, where that is kept
 };
 
 /// Runs every operation: once to warm up, then `repeat` times as often as Google Benchmark finds

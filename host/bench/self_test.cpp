@@ -113,7 +113,7 @@ std::vector<SelfTestCheck> run_self_test(Context& context,
     options.traversal = traversal;
     const auto all = [&] { check_way(context, options, way, model, camera, expected, out); };
     if (!keep_failures) return all();
-    const std::string failure = failure_of(all);
+    const std::string failure = failure_of(all).reason;
     if (failure.empty()) return;
     out.push_back({way + ": all of it", std::numeric_limits<double>::quiet_NaN(), 0.0, failure});
   };

@@ -17,11 +17,9 @@ RawBuffer::RawBuffer(Context& context, std::size_t bytes, const std::string& lab
   Context::Impl& owner = context.impl();
   if (bytes > owner.info.max_allocation) {
     throw ResourceError(
-        fmt::format("The buffer '{}' needs {:.1f} MiB but {} allows {:.1f} MiB at once: use fewer "
-                    "Gaussians (--max-gaussians) "
-                    "or a larger --downscale",
-                    label, static_cast<double>(bytes) / (1 << 20), owner.info.name,
-                    static_cast<double>(owner.info.max_allocation) / (1 << 20)));
+        fmt::format("The buffer '{}' needs {:.1f} MiB but {} allows {:.1f} MiB at once: {}", label,
+                    static_cast<double>(bytes) / (1 << 20), owner.info.name,
+                    static_cast<double>(owner.info.max_allocation) / (1 << 20), kLessMemory));
   }
   try {
     owner.faults.check(Fault::kAllocation);

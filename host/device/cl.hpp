@@ -16,6 +16,11 @@ namespace raysplats {
 /// "CL_OUT_OF_RESOURCES" for -5 and so on.
 std::string cl_error_name(cl_int status);
 
+/// What to do where memory does not suffice.
+inline constexpr const char* kLessMemory =
+    "use fewer Gaussians (--max-gaussians of train and convert), smaller pictures or a device with "
+    "more memory";
+
 /// Throws the DeviceError or ResourceError that fits `error`; `what` says what was attempted and on
 /// what.
 [[noreturn]] void throw_cl_error(const cl::Error& error, const std::string& what);

@@ -58,8 +58,7 @@ void throw_cl_error(const cl::Error& error, const std::string& what) {
       fmt::format("{}: {} reported {}", what, error.what(), cl_error_name(status));
   if (status == CL_MEM_OBJECT_ALLOCATION_FAILURE || status == CL_OUT_OF_HOST_MEMORY ||
       status == CL_INVALID_BUFFER_SIZE) {
-    throw ResourceError(message +
-                        "; use fewer Gaussians, a larger --downscale or a device with more memory");
+    throw ResourceError(message + "; " + kLessMemory);
   }
   throw DeviceError(message);
 }

@@ -23,6 +23,7 @@
 #include <initializer_list>
 #include <utility>
 
+#include "images/library_reason.hpp"
 #include "io/image/image_limits.hpp"
 #include "raysplats/error.hpp"
 
@@ -40,18 +41,6 @@ constexpr const char* kAlpha = "raysplats:alpha";
 constexpr const char* kStraight = "straight";
 
 constexpr std::size_t kNamed = 8;  // channels that a refusal names
-
-// "path: what", without the path.
-std::string reason(const std::string& path, std::string text) {
-  for (std::size_t at; (at = text.find(path)) != std::string::npos;) text.erase(at, path.size());
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  const std::size_t begin = text.find_first_not_of(" :'\"");
-  return begin == std::string::npos ? "its data are damaged" : text.substr(begin);
-}
-
-[[noreturn]] void fail_to_read(const std::string& path, const std::string& what) {
-  throw DataError(fmt::format("The image {} cannot be read: {}", path, reason(path, what)));
-}
 
 // What the core has told last; it has no other place for it while a file is being opened.
 thread_local std::string core_message;
@@ -197,8 +186,7 @@ class ExrDecoder : public ImageDecoder {
   } catch (const Error&) {
     throw;
   } catch (const std::exception& error) {
-    throw DataError(
-        fmt::format("The image {} cannot be decoded: {}", path_, reason(path_, error.what())));
+    fail_to_read(path_, error.what());
   }
 
  private:

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "images/exr_codec.hpp"
+#include "images/library_reason.hpp"
 #include "images/network.hpp"
 #include "io/image/image_codec.hpp"
 #include "io/image/image_limits.hpp"
@@ -23,11 +24,6 @@
 
 namespace raysplats::io {
 namespace {
-
-std::string reason(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text.empty() ? "its data are damaged" : text;
-}
 
 std::vector<std::uint8_t> to_bytes(const Image& image, int channels) {
   std::vector<std::uint8_t> bytes;
@@ -65,8 +61,7 @@ class OiioDecoder : public ImageDecoder {
     }
     OIIO::ImageSpec spec;
     if (!input_->open(name_, spec, straight_config())) {
-      throw DataError(
-          fmt::format("The image {} cannot be read: {}", name_, reason(input_->geterror())));
+      fail_to_read(name_, input_->geterror());
     }
     const bool flat = spec.nchannels >= 1 && spec.depth <= 1 && !spec.deep;
     require_bearable_size(name_, flat ? spec.width : 0, spec.height);
@@ -143,10 +138,7 @@ class OiioDecoder : public ImageDecoder {
     };
     if (!read(0, at_once ? colors + 1 : colors, numbers.data()) ||
         (covered && !at_once && !read(alpha, alpha + 1, numbers.data() + colors))) {
-      throw DataError(
-          fmt::format("The image {} cannot be decoded ({}): copy it again if it is truncated or "
-                      "damaged, or convert it to PNG or JPEG",
-                      name_, reason(input_->geterror())));
+      fail_to_read(name_, input_->geterror());
     }
     image.numbers = std::move(numbers);
     return image;
@@ -179,9 +171,9 @@ class OiioGif : public MovieEncoder {
  private:
   void require(bool done) {
     if (done) return;
-    throw DataError(
-        fmt::format("The video {} cannot be written: {}", path_,
-                    output_ ? reason(output_->geterror()) : "OpenImageIO lacks the format GIF"));
+    throw DataError(fmt::format(
+        "The video {} cannot be written: {}", path_,
+        output_ ? library_reason(path_, output_->geterror()) : "OpenImageIO lacks the format GIF"));
   }
   std::string path_;
   OIIO::ImageSpec spec_;
@@ -202,8 +194,7 @@ class OiioCodec : public ImageCodec {
     const OIIO::ImageSpec config = straight_config();
     const auto input = OIIO::ImageInput::open(path, &config);
     if (!input) {
-      throw DataError(
-          fmt::format("The image {} cannot be read: {}", path, reason(OIIO::geterror())));
+      fail_to_read(path, OIIO::geterror());
     }
     const std::string_view format = input->format_name();
     // TIFF tells whether alpha multiplies; that of WebP does not, but OpenImageIO 2.4 multiplies it
@@ -233,9 +224,9 @@ class OiioCodec : public ImageCodec {
         output && output->set_ioproxy(&encoded) && output->open(path.string(), spec) &&
         output->write_image(OIIO::TypeUInt8, to_bytes(image, channels).data()) && output->close();
     if (!written) {
-      throw DataError(
-          fmt::format("The image {} cannot be written: {}", path.string(),
-                      output ? reason(output->geterror()) : "OpenImageIO lacks the format"));
+      throw DataError(fmt::format("The image {} cannot be written: {}", path.string(),
+                                  output ? library_reason(path.string(), output->geterror())
+                                         : "OpenImageIO lacks the format"));
     }
     return encoded.buffer();
   }

@@ -32,13 +32,16 @@ GradientSumChoice GradientSumChoice::of(const TraceOptions& options,
   }
   if (out.sum != GradientSum::kCopies) return out;
   const std::size_t units = std::max<std::size_t>(device.compute_units, 1);
-  const std::size_t fit = std::min<std::size_t>(room, device.max_allocation) /
-                          (std::max<std::size_t>(lines, 1) * sizeof(GradientSums::Line));
+  const std::size_t copy = std::max<std::size_t>(lines, 1) * sizeof(GradientSums::Line);
+  // Exact sums would take as much, beside the lines that they are rounded to.
+  const std::size_t exact = (RS_EXACT_WORDS + 1) * copy;
+  const std::size_t fit =
+      std::min<std::size_t>(std::max(room, exact), device.max_allocation) / copy;
   if (fit < units) {
     out.sum = GradientSum::kExact;
     out.crowded_out = true;
   } else {
-    out.copies = std::min(copies_per_unit * units, fit);
+    out.copies = std::clamp(room / copy, units, std::min(copies_per_unit * units, fit));
   }
   return out;
 }
@@ -60,7 +63,7 @@ void GradientSums::prepare(const GradientSumChoice& choice, std::size_t count) {
   if (choice.crowded_out && !std::exchange(told_, true)) {
     const std::size_t units = std::max<std::size_t>(context_->device().compute_units, 1);
     spdlog::info(
-        "{}: a private copy for each of {} compute units takes {:.0f} MiB, more than their share "
+        "{}: a private copy for each of {} compute units takes {:.1f} MiB, more than their share "
         "of memory-budget or than one buffer may have: exact sums are taken, which are slower",
         label_, units, static_cast<double>(units * count * sizeof(Line)) / (1 << 20));
   }

@@ -23,9 +23,9 @@ struct GradientSumChoice {
   std::size_t copies = 1;                  ///< more than one with kCopies only
   bool crowded_out = false;                ///< copies were wanted and kExact took their place
 
-  /// The choice for `lines` lines of 16 floats. Copies may take `room` bytes in all:
-  /// `copies_per_unit` for each compute unit where they fit, at least one; where those do not fit
-  /// the choice is kExact.
+  /// The choice for `lines` lines of 16 floats. Copies may take `room` bytes in all, or what exact
+  /// sums would: `copies_per_unit` for each compute unit where `room` holds them, at least one;
+  /// where those do not fit the choice is kExact.
   static GradientSumChoice of(const TraceOptions& options,
                               const DeviceInfo& device,
                               std::size_t lines,

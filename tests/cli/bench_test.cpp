@@ -157,6 +157,19 @@ TEST_CASE("the file for the owner of a device to send is written whatever fails"
   }
 }
 
+TEST_CASE("bench tells what it measured whatever fails") {
+  const TemporaryFolder folder;
+  const Outcome outcome =
+      raysplats_program({"bench", "--sizes", "300", "--resolution", "64x48", "--repeat", "1",
+                         "--filter", "^(sort|adam)/", "--json", folder / "rows.json", "-q"},
+                        {{{"RAYSPLATS_FAIL_LAUNCH", "1"}}});
+  INFO(outcome.err);
+  CHECK(outcome.code == 4);
+  CHECK(contains(outcome.err, "fails in 1 part of what is measured, named as left out"));
+  CHECK(contains(outcome.out, "left out: the device's limits: "));
+  CHECK(nlohmann::json::parse(read_file(folder / "rows.json")).at("rows").size() == 2);
+}
+
 TEST_CASE("bench compares two folders of kernels") {
   const TemporaryFolder folder;
   const std::string kernels = raysplats::test::source_dir() + "/cl";

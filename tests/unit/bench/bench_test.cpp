@@ -163,11 +163,14 @@ TEST_CASE("operations: failures of device and memory are kept where that is aske
   };
   const auto samples = keep({good, refused, late, good});
   CHECK(samples[0][0].seconds.size() == 3);
-  CHECK(samples[0][0].failure.empty());
+  CHECK(samples[0][0].failure.reason.empty());
   CHECK(samples[1][0].lacking == "refused");
-  CHECK(samples[1][0].failure.empty());
-  for (const StageSamples& stage : samples[2]) CHECK(stage.failure == "memory is at its end");
-  CHECK(samples[3][0].failure.empty());
+  CHECK(samples[1][0].failure.reason.empty());
+  for (const StageSamples& stage : samples[2]) {
+    CHECK(stage.failure.reason == "memory is at its end");
+    CHECK(stage.failure.of_memory);
+  }
+  CHECK(samples[3][0].failure.reason.empty());
   CHECK(samples[3][0].seconds.empty());
   const BenchOperation wrong{
       {}, {}, [] { throw UsageError("of another kind"); }, {{"wrong", {}, true, {}}}};
@@ -189,6 +192,12 @@ TEST_CASE("bench: the other rows are measured where one fails") {
   REQUIRE(report.rows.size() == 2);
   CHECK(report.rows[0].name == "bounds");
   CHECK(report.rows[1].name == "adam");
+
+  // What had no room beside the rows before it is measured without them.
+  context.faults().arm(Fault::kAllocation, 22);
+  const BenchReport again = run_bench(context, options);
+  CHECK(again.left_out.empty());
+  CHECK(again.rows.size() == 3);
 
   context.faults().arm(Fault::kLaunch, 1);
   const BenchReport unlimited = run_bench(context, options);

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "scene/camera/camera_model.hpp"
+#include "trace/exact_sum.h"
 #include "unit/light/view_fixture.hpp"
 
 using namespace raysplats;
@@ -99,7 +100,9 @@ TEST_CASE("gradients through mirrors in exact sums are those in copies, in any b
   CHECK_ERRORS(errors_of(exact, gradients(GradientSum::kCopies, large)), 1e-5);
   CHECK_ERRORS(errors_of(exact, gradients(GradientSum::kAtomic, large)), 1e-5);
   CHECK(gradients(GradientSum::kExact, 1000) == exact);
-  CHECK(gradients(GradientSum::kCopies, 1000) == exact);
+  const HostGradients crowded = gradients(GradientSum::kCopies, 1000);
+  if (context.device().compute_units > RS_EXACT_WORDS + 1) CHECK(crowded == exact);
+  CHECK_ERRORS(errors_of(exact, crowded), 1e-5);
 }
 
 TEST_CASE("gradients through mirrors equal finite differences of a double reference [small]") {

@@ -139,17 +139,19 @@ TEST_CASE("an addend that is not finite or beyond the limit makes an exact sum N
 TEST_CASE("the way of adding follows the device, and is never atomic where it must not be") {
   DeviceInfo cpu;
   cpu.type = DeviceType::kCpu;
-  cpu.compute_units = 4;
+  cpu.compute_units = 10;
   cpu.max_allocation = 1 << 20;
   DeviceInfo gpu = cpu;
   gpu.type = DeviceType::kGpu;
+  DeviceInfo small = cpu;
+  small.compute_units = 4;
   TraceOptions options;
   const auto choose = [&](const DeviceInfo& device, std::size_t lines, std::size_t room) {
     return GradientSumChoice::of(options, device, lines, room, 2);
   };
   CHECK(choose(cpu, 100, 1 << 20).sum == GradientSum::kCopies);
-  CHECK(choose(cpu, 100, 1 << 20).copies == 8);
-  CHECK(choose(cpu, 100, 5 * 6400).copies == 5);
+  CHECK(choose(cpu, 100, 1 << 20).copies == 20);
+  CHECK(choose(cpu, 100, 13 * 6400).copies == 13);
   CHECK(!choose(cpu, 100, 1 << 20).crowded_out);
   CHECK(choose(gpu, 100, 1 << 20).sum == GradientSum::kAtomic);
   CHECK(choose(gpu, 100, 1 << 20).copies == 1);
@@ -160,19 +162,24 @@ TEST_CASE("the way of adding follows the device, and is never atomic where it mu
     options.gradient_sum = sum;
     for (const bool deterministic : {false, true}) {
       options.deterministic = deterministic;
-      CHECK(choose(cpu, 100, 3 * 6400).sum == GradientSum::kExact);
-      CHECK(choose(cpu, 100, 3 * 6400).copies == 1);
-      CHECK(choose(cpu, 100, 3 * 6400).crowded_out);
+      CHECK(choose(cpu, 100, 9 * 6400).sum == GradientSum::kExact);
+      CHECK(choose(cpu, 100, 9 * 6400).copies == 1);
+      CHECK(choose(cpu, 100, 9 * 6400).crowded_out);
       CHECK(choose(cpu, 10000, 1 << 24).sum == GradientSum::kExact);  // the largest allocation
+      // Exact sums of few compute units would take more than their copies.
+      CHECK(choose(small, 100, 6400).sum == GradientSum::kCopies);
+      CHECK(choose(small, 100, 6400).copies == 4);
+      CHECK(!choose(small, 100, 6400).crowded_out);
+      CHECK(choose(small, 10000, 6400).sum == GradientSum::kExact);
     }
   }
   options.gradient_sum = GradientSum::kCopies;
-  CHECK(choose(gpu, 100, 1 << 20).copies == 8);
+  CHECK(choose(gpu, 100, 1 << 20).copies == 20);
   options.gradient_sum = GradientSum::kAtomic;
   CHECK(choose(cpu, 100, 1 << 20).sum == GradientSum::kAtomic);
   options.gradient_sum = GradientSum::kExact;
   CHECK(choose(cpu, 100, 1 << 20).sum == GradientSum::kExact);
-  CHECK(!choose(cpu, 100, 3 * 6400).crowded_out);
+  CHECK(!choose(cpu, 100, 9 * 6400).crowded_out);
 }
 
 TEST_CASE("the log tells once that copies of gradients give way to exact sums") {

@@ -298,17 +298,18 @@ TEST_CASE("missing, empty, foreign and truncated images are refused with one sen
       write_bytes(
           scratch / cut,
           whole.substr(0, static_cast<std::size_t>(share * static_cast<double>(whole.size()))));
-      CHECK(read_error(scratch / cut) != "");
+      const std::string message = read_error(scratch / cut);
+      CHECK((contains(message, "copy it again") || contains(message, "corrupt")));
     }
   }
-  for (const char* name : {"a.tif", "a.bmp"}) {
+  for (const char* name : {"a.tif", "a.bmp", "a.webp"}) {
     std::vector<std::uint8_t> pixels(200 * 150 * 3, 77);
     for (std::size_t i = 0; i < pixels.size(); ++i)
       pixels[i] = static_cast<std::uint8_t>(i * i / 7);
     write_raw(scratch / name, 3, OIIO::TypeUInt8, pixels.data(), 200, 150);
     const std::string whole = read_bytes(scratch / name);
     write_bytes(scratch / "cut" += fs::path(name).extension(), whole.substr(0, whole.size() / 2));
-    CHECK(read_error((scratch / "cut") += fs::path(name).extension()) != "");
+    CHECK(contains(read_error((scratch / "cut") += fs::path(name).extension()), "copy it again"));
   }
 }
 
