@@ -33,7 +33,7 @@ std::vector<std::uint8_t> to_bytes(const Image& image, int channels) {
     for (int c = 0; c < channels; ++c) {
       // Written so that NaN becomes 0.
       const float value = values[c] > 0.0f ? std::min(values[c], 1.0f) : 0.0f;
-      bytes.push_back(static_cast<std::uint8_t>(value * 255.0f + 0.5f));
+      bytes.push_back(static_cast<std::uint8_t>(std::lround(value * 255.0f)));
     }
   }
   return bytes;

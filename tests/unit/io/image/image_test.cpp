@@ -50,7 +50,7 @@ double largest_difference(const Image& a, const Image& b) {
 /// Writes a file of any format and type with OpenImageIO itself.
 void write_raw(const fs::path& path,
                int channels,
-               OIIO::TypeDesc type,
+               const OIIO::TypeDesc& type,
                const void* data,
                int width,
                int height) {
@@ -64,7 +64,7 @@ void write_raw(const fs::path& path,
 }
 
 std::string read_error(const fs::path& path) {
-  const std::string message = data_error([&] { read_image(path); });
+  std::string message = data_error([&] { read_image(path); });
   INFO(message);
   CHECK(contains(message, path.filename().string()));
   CHECK(message.find('\n') == std::string::npos);
