@@ -128,8 +128,9 @@ TEST_CASE("gradients through mirrors equal finite differences of a double refere
     std::vector<Seen> at;
     std::size_t reflected = 0, twice = 0, left_out = 0;
     for (std::size_t i = 0; i < pixels; ++i) {
+      const std::size_t x = i % 14, y = i / 14;
       rays.push_back(
-          camera_ray(camera, static_cast<double>(i % 14) + 0.5, static_cast<double>(i / 14) + 0.5));
+          camera_ray(camera, static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5));
       at.push_back(see(parameters, options, panels, bounces, rays[i]));
       const auto segments = std::count(at[i].hits.begin(), at[i].hits.end(), 0xffffffffu);
       reflected += segments > 1 ? 1 : 0;
@@ -195,8 +196,9 @@ TEST_CASE("mirrors show the footprint of a view, in any batches [small]") {
   const Image image = tracer.download_image();
   std::size_t compared = 0, wrong = 0, reflected = 0;
   for (std::size_t i = 0; i < image.pixels(); i += 7) {
+    const std::size_t x = i % 80, y = i / 80;
     const CameraRay ray =
-        camera_ray(camera, static_cast<double>(i % 80) + 0.5, static_cast<double>(i / 80) + 0.5);
+        camera_ray(camera, static_cast<double>(x) + 0.5, static_cast<double>(y) + 0.5);
     const Seen expected = see(parameters, options, panels, 3, ray,
                               reference::pixel_cone(camera, options, ray.direction));
     if (expected.margin < 1e-4) continue;

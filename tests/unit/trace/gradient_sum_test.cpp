@@ -42,9 +42,9 @@ Pass trace_view(Context& context,
   gradient.upload(values);
   GaussianGradients out;
   tracer.backward(gaussians, gradient, out);
-  const Pass first{tracer.image().download(), out.means.download(),     out.quaternions.download(),
-                   out.scales.download(),     out.opacities.download(), out.sh.download(),
-                   out.screen.download()};
+  Pass first{tracer.image().download(), out.means.download(),     out.quaternions.download(),
+             out.scales.download(),     out.opacities.download(), out.sh.download(),
+             out.screen.download()};
   // Once more with the same buffers: nothing may be left in them.
   tracer.forward(gaussians, camera, true);
   tracer.backward(gaussians, gradient, out);

@@ -118,9 +118,9 @@ TEST_CASE("sizes are those of the points that a start takes, each place once") {
   Dataset dataset;
   // A square grid of unit steps, every point four times.
   for (int i = 0; i < 4 * 400; ++i) {
-    dataset.points.positions.insert(
-        dataset.points.positions.end(),
-        {static_cast<float>(i / 4 % 20), static_cast<float>(i / 80), 0.0f});
+    const int column = i / 4 % 20, row = i / 80;
+    dataset.points.positions.insert(dataset.points.positions.end(),
+                                    {static_cast<float>(column), static_cast<float>(row), 0.0f});
     dataset.points.colors.insert(dataset.points.colors.end(), 3, 0.5f);
   }
   TrainOptions options;
