@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -17,6 +16,7 @@
 #include "images/exr_codec.hpp"
 #include "images/library_reason.hpp"
 #include "images/network.hpp"
+#include "io/image/display_byte.hpp"
 #include "io/image/image_codec.hpp"
 #include "io/image/image_limits.hpp"
 #include "io/image/images_interface.hpp"
@@ -30,11 +30,7 @@ std::vector<std::uint8_t> to_bytes(const Image& image, int channels) {
   bytes.reserve(image.pixels() * static_cast<std::size_t>(channels));
   for (std::size_t pixel = 0; pixel < image.pixels(); ++pixel) {
     const float* values = &image.data[pixel * static_cast<std::size_t>(image.channels)];
-    for (int c = 0; c < channels; ++c) {
-      // Written so that NaN becomes 0.
-      const float value = values[c] > 0.0f ? std::min(values[c], 1.0f) : 0.0f;
-      bytes.push_back(static_cast<std::uint8_t>(std::lround(value * 255.0f)));
-    }
+    for (int c = 0; c < channels; ++c) bytes.push_back(display_byte(values[c]));
   }
   return bytes;
 }

@@ -8,8 +8,6 @@
 #include <cstdint>
 #include <utility>
 
-#include "trace/exact_sum.h"
-
 namespace raysplats {
 namespace {
 
@@ -33,10 +31,8 @@ GradientSumChoice GradientSumChoice::of(const TraceOptions& options,
   if (out.sum != GradientSum::kCopies) return out;
   const std::size_t units = std::max<std::size_t>(device.compute_units, 1);
   const std::size_t copy = std::max<std::size_t>(lines, 1) * sizeof(GradientSums::Line);
-  // Exact sums would take as much, beside the lines that they are rounded to.
-  const std::size_t exact = (RS_EXACT_WORDS + 1) * copy;
   const std::size_t fit =
-      std::min<std::size_t>(std::max(room, exact), device.max_allocation) / copy;
+      std::min<std::size_t>(std::max(room, kExactCopies * copy), device.max_allocation) / copy;
   if (fit < units) {
     out.sum = GradientSum::kExact;
     out.crowded_out = true;

@@ -10,6 +10,7 @@
 #include "device/context.hpp"
 #include "raysplats/device.hpp"
 #include "raysplats/trace_options.hpp"
+#include "trace/exact_sum.h"
 
 namespace raysplats {
 
@@ -18,6 +19,8 @@ namespace raysplats {
 struct GradientSumChoice {
   /// Copies of packets' gradients for each compute unit: more share the tiles out more evenly.
   static constexpr std::size_t kPacketCopies = 2;
+  /// What exact sums take, in copies: their words, and the lines that they are rounded to.
+  static constexpr std::size_t kExactCopies = RS_EXACT_WORDS + 1;
 
   GradientSum sum = GradientSum::kCopies;  ///< never kAuto
   std::size_t copies = 1;                  ///< more than one with kCopies only

@@ -29,7 +29,8 @@ class MemoryShares {
   /// Hits kept for the backward pass, and their segments.
   std::size_t hit_streams() const { return budget_ / 2; }
   std::size_t tile_lists() const { return budget_ / 4; }
-  /// Private copies of line gradients.
+  /// Private copies of line gradients; those that take less than exact sums may go beyond it
+  /// (GradientSumChoice).
   std::size_t packet_gradients() const { return budget_ / 4; }
 
   /// Private copies of the gradients of rays.

@@ -35,13 +35,12 @@ namespace {
 // (train/loss/image_loss.cpp).
 constexpr std::size_t kSsimPlaneBytes = 9 * sizeof(float);
 
-// Whether gradients of packets may be added in long integers. Copies that do not fit their share
-// of memory-budget become that, too.
-bool may_sum_exactly(const TrainOptions& options, std::size_t gaussians, const DeviceInfo& device) {
-  const TraceOptions trace = options.trace;
-  return GradientSumChoice::of(trace, device, gaussians,
-                               MemoryShares(trace, device).packet_gradients(), 1)
-             .sum == GradientSum::kExact;
+// How gradients of packets are added, with as few copies as there may be.
+GradientSumChoice packet_sums(const TrainOptions& options,
+                              std::size_t gaussians,
+                              const DeviceInfo& device) {
+  return GradientSumChoice::of(options.trace, device, gaussians,
+                               MemoryShares(options.trace, device).packet_gradients(), 1);
 }
 
 // What views that are traced ray by ray hold per Gaussian, and in their largest buffer.
@@ -104,10 +103,13 @@ std::size_t packet_bytes(const TrainOptions& options,
   const std::size_t copies =
       copied ? GradientSumChoice::kPacketCopies * std::max<std::size_t>(device.compute_units, 1) - 1
              : 0;
+  const std::size_t line = demand.gaussians * sizeof(RsLine);
+  // As many copies as the share holds, but those that take less than exact sums stay beyond it.
   return std::min(shares.hit_streams(), hits / 4 * 5 * row) +
          std::min(shares.tile_lists(),
                   CandidateLists::with_headroom(pairs) * CandidateLists::kBytesPerCandidate) +
-         std::min(shares.packet_gradients(), demand.gaussians * copies * sizeof(RsLine));
+         std::max(std::min(shares.packet_gradients(), copies * line),
+                  (packet_sums(options, demand.gaussians, device).copies - 1) * line);
 }
 
 }  // namespace
@@ -117,9 +119,10 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
                                const DeviceInfo& device) {
   const auto sh = 3 * static_cast<std::size_t>(sh_coefficients(options.sh_degree));
   const std::size_t floats = 3 + 4 + 3 + 1 + sh;
-  const std::size_t exact = may_sum_exactly(options, demand.gaussians, device)
-                                ? 16 * RS_EXACT_WORDS * sizeof(std::uint32_t)
-                                : 0;
+  const std::size_t exact =
+      packet_sums(options, demand.gaussians, device).sum == GradientSum::kExact
+          ? 16 * RS_EXACT_WORDS * sizeof(std::uint32_t)
+          : 0;
   MemoryEstimate out;
   // Parameters, gradients, two moments, gradients on the screen (3) and statistics of density
   // control (2); while the set changes the new parameters, their sources and roles, later the mean

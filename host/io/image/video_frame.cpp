@@ -3,9 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-
+#include "io/image/display_byte.hpp"
 #include "io/image/side_limits.hpp"
 #include "raysplats/error.hpp"
 
@@ -27,11 +25,8 @@ std::vector<std::uint8_t> rgb_bytes(const Image& frame) {
   std::vector<std::uint8_t> bytes;
   bytes.reserve(3 * frame.pixels());
   for (std::size_t i = 0; i < frame.pixels(); ++i) {
-    for (std::size_t c = 0; c < 3; ++c) {
-      const float given = frame.data[i * static_cast<std::size_t>(frame.channels) + c];
-      const float value = given > 0.0f ? std::min(given, 1.0f) : 0.0f;
-      bytes.push_back(static_cast<std::uint8_t>(std::lround(value * 255.0f)));
-    }
+    for (std::size_t c = 0; c < 3; ++c)
+      bytes.push_back(display_byte(frame.data[i * static_cast<std::size_t>(frame.channels) + c]));
   }
   return bytes;
 }

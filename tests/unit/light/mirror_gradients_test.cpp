@@ -5,7 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "scene/camera/camera_model.hpp"
-#include "trace/exact_sum.h"
+#include "trace/gradient_sums.hpp"
 #include "unit/light/view_fixture.hpp"
 
 using namespace raysplats;
@@ -101,7 +101,7 @@ TEST_CASE("gradients through mirrors in exact sums are those in copies, in any b
   CHECK_ERRORS(errors_of(exact, gradients(GradientSum::kAtomic, large)), 1e-5);
   CHECK(gradients(GradientSum::kExact, 1000) == exact);
   const HostGradients crowded = gradients(GradientSum::kCopies, 1000);
-  if (context.device().compute_units > RS_EXACT_WORDS + 1) CHECK(crowded == exact);
+  if (context.device().compute_units > GradientSumChoice::kExactCopies) CHECK(crowded == exact);
   CHECK_ERRORS(errors_of(exact, crowded), 1e-5);
 }
 

@@ -7,7 +7,7 @@
 #include <glm/matrix.hpp>
 
 #include "raysplats/error.hpp"
-#include "trace/exact_sum.h"
+#include "trace/gradient_sums.hpp"
 #include "unit/bvh/tree_forms.hpp"
 #include "unit/trace/trace_fixture.hpp"
 
@@ -407,7 +407,7 @@ TEST_CASE("gradients of rays are the same to the bit but for atomics, exact ones
   // Copies that do not fit give way to exact sums, or, where these would take more, become fewer.
   options.gradient_sum = GradientSum::kCopies;
   options.memory_budget = 100000;
-  if (context.device().compute_units > RS_EXACT_WORDS + 1) CHECK(run() == exact);
+  if (context.device().compute_units > GradientSumChoice::kExactCopies) CHECK(run() == exact);
   CHECK_ERRORS(errors_of(run(), copies), 1e-5);
   // Batches, too small to be ordered, added by one object that is used again.
   options.gradient_sum = GradientSum::kExact;

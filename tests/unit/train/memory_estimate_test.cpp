@@ -184,6 +184,10 @@ TEST_CASE("hit lists count up to their budget, exact sums where they may be used
   CHECK(estimate_memory(options, demand, gpu).hits == std::size_t{384} << 20);
   cpu.compute_units = 2;
   CHECK(estimate_memory(options, demand, cpu).hits == (std::size_t{384} << 20) + 3 * 6'400'000);
+  // Exact sums would take more than the copies that are left.
+  options.trace.memory_budget = std::size_t{1} << 20;
+  CHECK(estimate_memory(options, demand, cpu).hits == (std::size_t{3} << 18) + 6'400'000);
+  options.trace.memory_budget = std::size_t{512} << 20;
   options.trace.max_hits = 2;
   options.trace.packet_width = 8;
   options.trace.deterministic = true;
