@@ -51,17 +51,6 @@ Gaussians subset(const Gaussians& model, std::size_t limit) {
   return gathered(model, std::vector<std::uint32_t>(chosen.begin(), chosen.end()));
 }
 
-// The points with finite positions.
-PointCloud finite_points(const PointCloud& points) {
-  PointCloud out;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const float* p = points.positions.data() + 3 * i;
-    if (std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]))
-      append_point(points, i, out);
-  }
-  return out;
-}
-
 // Points that the photos tell of: of a body that is cut out, else of what a sweep finds in
 // `depths`, or in those that it looks for: then nothing else has told that the poses are sound.
 // `unsure`: as of swept_points().
@@ -127,38 +116,38 @@ Gaussians given_model(const Dataset& dataset,
 Gaussians gaussians_from_points(const PointCloud& points,
                                 int sh_degree,
                                 double opacity,
-                                std::span<const Camera> cameras,
-                                const PointCloud& uncovered) {
+                                std::span<const Camera> cameras) {
   constexpr double kMinScale = 1e-4;  // of the scene extent
   constexpr double kMaxScale = 0.1;   // of the distance to the nearest camera
-  constexpr double kMaxUncovered = 0.05;
-  constexpr double kRoom = 1.001;  // more than what rounding does
-  PointCloud all = finite_points(points);
-  const std::size_t covered = all.size();
-  append_points(finite_points(uncovered), all);
+  constexpr double kRoom = 1.001;     // more than what rounding does
+  PointCloud finite;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const float* p = points.positions.data() + 3 * i;
+    if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) continue;
+    append_point(points, i, finite);
+  }
   Gaussians model;
   model.sh_degree = sh_degree;
-  model.resize(all.size());
-  const std::vector<float> distances = neighbour_distances(all.positions);
+  model.resize(finite.size());
+  const std::vector<float> distances = neighbour_distances(finite.positions);
   const auto stride = 3 * static_cast<std::size_t>(sh_coefficients(sh_degree));
   const auto parameter = static_cast<float>(logit(opacity));
-  const double least = kMinScale * scene_extent(cameras, all);
+  const double least = kMinScale * scene_extent(cameras, finite);
   const std::vector<double> places = places_of(cameras);
   const KdTree<double> tree(places);
   in_parallel(model.size(), [&](std::size_t i) {
-    const float* p = all.positions.data() + 3 * i;
+    const float* p = finite.positions.data() + 3 * i;
     // One that has no neighbours, or all of them in its place, may be as large as any.
     const double size = distances[i] > 0 ? static_cast<double>(distances[i])
                                          : std::numeric_limits<double>::infinity();
     // Cameras farther away do not bound it, so that most searches end early.
-    const double share = i < covered ? kMaxScale : kMaxUncovered;
-    const double within = kRoom * size / share;
-    const double most = share * tree.nearest_distance({p[0], p[1], p[2]}, within);
+    const double within = kRoom * size / kMaxScale;
+    const double most = kMaxScale * tree.nearest_distance({p[0], p[1], p[2]}, within);
     const double scale = std::max(std::min(size, most), least);
     for (std::size_t a = 0; a < 3; ++a) {
       model.means[3 * i + a] = p[a];
       model.log_scales[3 * i + a] = static_cast<float>(std::log(scale));
-      model.sh[stride * i + a] = static_cast<float>((all.colors[3 * i + a] - 0.5) / RS_SH0);
+      model.sh[stride * i + a] = static_cast<float>((finite.colors[3 * i + a] - 0.5) / RS_SH0);
     }
     model.opacities[i] = parameter;
   });
@@ -215,9 +204,8 @@ Gaussians initial_model(const Dataset& dataset,
   const bool by_name = options.init == "auto" || options.init == "colmap" ||
                        options.init == "random" || options.init == "photos";
   if (!by_name) return given_model(dataset, cameras, limit, options);
-  const auto start = [&](const PointCloud& points, const PointCloud& uncovered = {}) {
-    return inside(gaussians_from_points(points, options.sh_degree, start_opacity(options), cameras,
-                                        uncovered),
+  const auto start = [&](const PointCloud& points) {
+    return inside(gaussians_from_points(points, options.sh_degree, start_opacity(options), cameras),
                   about_origin(options.bounds, dataset.origin));
   };
   const std::size_t count =
@@ -228,7 +216,7 @@ Gaussians initial_model(const Dataset& dataset,
   begun.count = count;
   if (has_points && (options.init == "auto" || options.init == "colmap"))
     begun = sparse_start(dataset, cameras, photos, limit, count, options);
-  if (begun.enough) return start(begun.points, begun.uncovered);
+  if (begun.enough) return start(begun.points);
   if (options.init_count > 0 && static_cast<std::size_t>(options.init_count) > limit) {
     spdlog::warn(
         "--init-count asks for {} Gaussians, but this run may have {}: it starts with no more "
@@ -243,15 +231,14 @@ Gaussians initial_model(const Dataset& dataset,
   }
   const std::vector<SmallPhoto>& told =
       photos(begun.beside.part == Beside::Part::kNothing ? PhotoChoice::kAll : PhotoChoice::kMany);
-  const std::size_t taken = begun.points.size() + begun.uncovered.size();
-  const std::size_t room = std::min(begun.count, limit - std::min(limit, taken));
+  const std::size_t room = std::min(begun.count, limit - std::min(limit, begun.points.size()));
   const bool in_their_places = begun.beside.part == Beside::Part::kInTheirPlaces;
   PointCloud seen =
       photo_points(dataset, cameras, region, told, begun.beside.depths, room,
                    in_their_places ? kUnsureBeside : kUnsureShare, options.seed, checks_poses);
   if (in_their_places) seen = beside_points(seen, begun.sparse, photos(PhotoChoice::kSome));
-  append_points(seen, begun.points);
-  return start(begun.points, begun.uncovered);
+  for (std::size_t i = 0; i < seen.size(); ++i) append_point(seen, i, begun.points);
+  return start(begun.points);
 }
 
 }  // namespace raysplats

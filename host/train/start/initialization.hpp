@@ -20,14 +20,12 @@ namespace raysplats {
 /// Isotropic Gaussians at the points: the scale is the mean distance of the three nearest
 /// neighbours, as in 3DGS, at least 1e-4 of scene_extent() and at most 0.1 of the distance to
 /// the nearest camera (what stands alone far away may be large, before a camera it may not), which
-/// a point takes that no neighbour is apart from; band 0 holds the colours. `uncovered` points
-/// (uncovered_points()) stand behind them, and may be half as large: they are far apart.
-/// Points that are not finite are left out.
+/// a point takes that no neighbour is apart from; band 0 holds the colours. Points that are not
+/// finite are left out.
 Gaussians gaussians_from_points(const PointCloud& points,
                                 int sh_degree,
                                 double opacity,
-                                std::span<const Camera> cameras,
-                                const PointCloud& uncovered = {});
+                                std::span<const Camera> cameras);
 
 /// The points that can be relied on: seen by at least three photos with an error of at most 2
 /// pixels, unless fewer than 2000 are left; all of them when nothing is known about them.

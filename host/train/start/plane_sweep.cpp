@@ -487,7 +487,7 @@ SweptPoints searched_points(std::span<const SmallPhoto> photos,
   if (beside.size() > 0) {
     spdlog::debug("{} points of the start stand {}", beside.size(),
                   depths.open ? "before what is too far to tell its depth" : "beyond these depths");
-    append_points(beside, out.points);
+    for (std::size_t i = 0; i < beside.size(); ++i) append_point(beside, i, out.points);
   }
   return out;
 }

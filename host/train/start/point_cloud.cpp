@@ -17,8 +17,4 @@ void append_point(const PointCloud& from, std::size_t i, PointCloud& to) {
   }
 }
 
-void append_points(const PointCloud& from, PointCloud& to) {
-  for (std::size_t i = 0; i < from.size(); ++i) append_point(from, i, to);
-}
-
 }  // namespace raysplats

@@ -20,7 +20,4 @@ void append_point(PointCloud& to, const glm::dvec3& position, const glm::dvec3& 
 /// Adds a point of `from`, without its track and error.
 void append_point(const PointCloud& from, std::size_t i, PointCloud& to);
 
-/// Adds all points of `from` so.
-void append_points(const PointCloud& from, PointCloud& to);
-
 }  // namespace raysplats

@@ -174,22 +174,23 @@ PointCloud start_points(const Dataset& dataset,
   return colored_by_photos(std::move(points), photos(PhotoChoice::kSome));
 }
 
-// Points where no sparse ones are, as in skies and on white walls: a fifth of `count` if these were
-// nowhere. A body that is cut out, or within bounds, has nothing around it.
-PointCloud uncovered_by(const PointCloud& sparse,
-                        const Dataset& dataset,
-                        std::span<const Camera> cameras,
-                        const PhotoSource& photos,
-                        std::size_t count,
-                        const TrainOptions& options) {
+// Adds points where no sparse ones are, as in skies and on white walls, a fifth as many as there
+// are if these were nowhere. A body that is cut out, or within bounds, has nothing around it.
+void add_uncovered(const PointCloud& sparse,
+                   const Dataset& dataset,
+                   std::span<const Camera> cameras,
+                   const PhotoSource& photos,
+                   const TrainOptions& options,
+                   PointCloud& points) {
   constexpr double kShare = 0.2;
   const bool wanted = options.init == "auto" && options.photo_points;
-  if (!wanted || dataset.alpha_is_background || options.bounds) return {};
-  const auto looks = static_cast<std::size_t>(kShare * static_cast<double>(count));
-  PointCloud found = uncovered_points(sparse, photos(PhotoChoice::kSome),
-                                      typical_depth(cameras, dataset.points), looks, options.seed);
+  if (!wanted || dataset.alpha_is_background || options.bounds) return;
+  const auto looks = static_cast<std::size_t>(kShare * static_cast<double>(points.size()));
+  const PointCloud found =
+      uncovered_points(sparse, photos(PhotoChoice::kSome), typical_depth(cameras, dataset.points),
+                       looks, options.seed);
   spdlog::debug("{} points of the start stand where there are no sparse ones", found.size());
-  return found;
+  for (std::size_t i = 0; i < found.size(); ++i) append_point(found, i, points);
 }
 
 }  // namespace
@@ -236,7 +237,7 @@ SparseStart sparse_start(const Dataset& dataset,
   }
   // Of the points that photos give everywhere some stand there already.
   if (out.enough || in_their_places)
-    out.uncovered = uncovered_by(out.sparse, dataset, cameras, photos, out.points.size(), options);
+    add_uncovered(out.sparse, dataset, cameras, photos, options, out.points);
   return out;
 }
 

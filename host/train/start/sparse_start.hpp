@@ -32,11 +32,10 @@ struct Beside {
   double weight = 1;  ///< of the usual number of points
 };
 
-/// What sparse points give to a start.
+/// What sparse points give to a start, with points where there are none.
 struct SparseStart {
   PointCloud points;
-  PointCloud sparse;     ///< all of them, of which the start may take an even choice
-  PointCloud uncovered;  ///< where there are none
+  PointCloud sparse;  ///< all of them, of which the start may take an even choice
   Beside beside;
   std::size_t count = 0;  ///< of points that the photos give
   bool enough = false;    ///< without those

@@ -54,14 +54,6 @@ TEST_CASE("points become Gaussians with their colour, clamped scales and the opa
   one.positions.assign(3, 0.0f);
   one.colors.assign(3, 0.5f);
   CHECK(first_size(one) == doctest::Approx(2.0));
-  // A twentieth where no points tell what is there.
-  PointCloud far = one;
-  far.positions.assign(3, 50.0f);
-  const Gaussians both = gaussians_from_points(one, 0, 0.1, cameras, far);
-  REQUIRE(both.size() == 2);
-  CHECK(std::exp(both.log_scales[0]) == doctest::Approx(2.0));
-  CHECK(both.means[3] == 50.0f);
-  CHECK(std::exp(both.log_scales[3]) == doctest::Approx(0.05 * std::sqrt(30.0 * 30 + 2 * 50 * 50)));
 }
 
 TEST_CASE("Gaussians of points have the bytes of a loop over all points and cameras") {
