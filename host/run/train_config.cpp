@@ -228,6 +228,8 @@ void apply_run_text(CLI::App& app,
   if (found.count("raise-clamped") == 0 && !given("raise-clamped")) options.raise_clamped = false;
   if (found.count("borders") == 0 && !given("borders")) options.data.borders = BorderUse::kKeep;
   if (found.count("photo-points") == 0 && !given("photo-points")) options.photo_points = false;
+  if (found.count("uncovered-points") == 0 && !given("uncovered-points"))
+    options.uncovered_points = options.photo_points;  // one key had been for both
   if (found.count("color-range") == 0 && !given("color-range")) options.color_range = 1;
   if (found.count("alpha-weight") == 0 && !given("alpha-weight")) options.alpha_weight = 0;
   if (found.count("strategy") > 0) return;

@@ -237,8 +237,11 @@ void add_start_options(TrainTable& t, TrainOptions& o) {
            "max-gaussians");
   t.flag(
       "photo-points", o.photo_points,
-      "put points of the photos beside sparse ones where photos tell of depth, and where there are "
-      "no sparse ones (init auto; not in runs by a time below a minute)");
+      "put points of the photos beside sparse ones where photos tell of depth (init auto; not in "
+      "runs by a time below a minute)");
+  t.flag("uncovered-points", o.uncovered_points,
+         "put points of any depth where there are no sparse ones, as in skies and on plain walls "
+         "(init auto)");
   t.number(
       "init-opacity", o.init_opacity, kFitted, 0.9999,
       "opacity of the first Gaussians (not of a model), at least 0.0001; -1 = 0.1, or 0.02 of a "

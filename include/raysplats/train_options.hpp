@@ -119,7 +119,8 @@ struct TrainOptions {
   std::string init = "auto";
   /// Gaussians of a start without points, or beside few; 0 = a share of max_gaussians.
   std::int64_t init_count = 0;
-  bool photo_points = true;  ///< "auto" may put points of the photos beside sparse ones
+  bool photo_points = true;      ///< "auto" may put points of the photos beside sparse ones
+  bool uncovered_points = true;  ///< and where there are no sparse ones, at any depth
   /// Opacity of the first Gaussians, in (0, 1); kFitted: 0.1, or 0.02 of a random start (not
   /// kMcmc).
   double init_opacity = kFitted;

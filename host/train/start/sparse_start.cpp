@@ -183,7 +183,7 @@ void add_uncovered(const PointCloud& sparse,
                    const TrainOptions& options,
                    PointCloud& points) {
   constexpr double kShare = 0.2;
-  const bool wanted = options.init == "auto" && options.photo_points;
+  const bool wanted = options.init == "auto" && options.uncovered_points;
   if (!wanted || dataset.alpha_is_background || options.bounds) return;
   const auto looks = static_cast<std::size_t>(kShare * static_cast<double>(points.size()));
   const PointCloud found =

@@ -378,6 +378,11 @@ TEST_CASE("a resumed run that is older than a key goes on as it began") {
   const TrainOptions asked = options_of("save-at = [7000]\n", {"--strategy", "budget"});
   CHECK(asked.strategy == DensityStrategy::kBudget);
   CHECK(asked.footprint == 0.0);
+  // One key had been for two.
+  CHECK_FALSE(old.uncovered_points);
+  CHECK(options_of("photo-points = true\n", {}).uncovered_points);
+  CHECK_FALSE(options_of("photo-points = false\n", {}).uncovered_points);
+  CHECK(options_of("photo-points = false\n", {"--uncovered-points"}).uncovered_points);
   const TrainOptions now = options_of("strategy = \"budget\"\nfootprint = 0.5\n", {});
   CHECK(now.strategy == DensityStrategy::kBudget);
   CHECK(now.footprint == 0.5);

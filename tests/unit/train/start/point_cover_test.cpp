@@ -88,8 +88,10 @@ TEST_CASE("a start from sparse points has some where there are none, unless thes
   CHECK(behind(options) > 10);
   CHECK(behind(options) < 200);
   options.photo_points = false;
+  CHECK(behind(options) > 10);
+  options.uncovered_points = false;
   CHECK(behind(options) == 0);
-  options.photo_points = true;
+  options = {};
   // A body of which alpha shows all has nothing around it, nor has what bounds leave.
   dataset.alpha_is_background = true;
   CHECK(behind(options) == 0);
