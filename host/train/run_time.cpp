@@ -19,7 +19,8 @@ constexpr double kBasisWork = 0.037;  // of one of its spherical harmonics
 constexpr double kPixelWork = 0.13;
 constexpr double kHitWork = 0.0244;
 constexpr double kCandidateWork = 1.25;
-constexpr double kUsualHits = 52.0;        // of a trained model, per pixel that shows something
+constexpr double kUsualHits = 80.0;        // of a trained model, per pixel
+constexpr double kUsualBodyHits = 52.0;    // of one that is cut out, per pixel that shows it
 constexpr double kCandidateGrowth = 1.15;  // from Gaussians split evenly to those of the end
 // Steps of trained models take longer than timed ones that do as much (long thin Gaussians are
 // candidates of more rays that miss them), and there is density control between them.
@@ -70,13 +71,14 @@ LoadRates LoadRates::of(std::span<const StepSample> samples) {
   return {sum.hits / sum.pixels, sum.candidates / sum.gaussians};
 }
 
-RateCurve expected_rates(const LoadRates& at_start,
-                         const LoadRates& at_full_size,
-                         double opaque_share) {
-  const double usual = kUsualHits * opaque_share;
-  double hits = at_full_size.hits;
-  if (hits > 0) hits = hits > usual ? std::sqrt(usual * hits) : usual;
-  return {at_start, {hits, kCandidateGrowth * at_full_size.candidates}};
+double trained_hits(double hits, std::optional<double> body_share) {
+  const double usual = body_share ? kUsualBodyHits * *body_share : kUsualHits;
+  if (hits > usual) return std::sqrt(usual * hits);
+  return hits > 0 ? usual : 0;
+}
+
+RateCurve expected_rates(const LoadRates& at_start, const LoadRates& alike, double hits) {
+  return {at_start, {hits, kCandidateGrowth * alike.candidates}};
 }
 
 double expected_gaussians(const TrainOptions& options,

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 
 #include "raysplats/train_options.hpp"
@@ -22,7 +23,7 @@ struct StepLoad {
 /// A step that was timed.
 struct StepSample {
   StepLoad load;
-  double seconds = 0;
+  double seconds = 0;  ///< 0 of one that was made again, whose time tells nothing
 };
 
 /// What a step costs, in units of what one Gaussian of the model does: each Gaussian is moved by
@@ -52,13 +53,15 @@ struct RateCurve {
   LoadRates first, last;
 };
 
-/// The curve from a run's first steps, and from steps at full size with the Gaussians of its end. A
-/// start that leaves the rays much light fills up, one that leaves them little clears: most trained
-/// models have about 52 hits per pixel that shows something, `opaque_share` of all. Rays that
-/// count no hits, those traced one by one, have none at the end either.
-RateCurve expected_rates(const LoadRates& at_start,
-                         const LoadRates& at_full_size,
-                         double opaque_share);
+/// Hits per pixel of a trained model, of which the start has as many as are given. A start that
+/// leaves the rays much light fills up, one that leaves them little clears: most trained models
+/// have about 80, those of bodies that are cut out 52 where they are, `body_share` of all pixels.
+/// Rays that count no hits, those traced one by one, have none at the end either.
+double trained_hits(double hits, std::optional<double> body_share);
+
+/// The curve from a run's first steps to as many hits per pixel, where steps with the Gaussians of
+/// its end and rays that meet about as many have the rates `alike`.
+RateCurve expected_rates(const LoadRates& at_start, const LoadRates& alike, double hits);
 
 /// The Gaussians of a run after `iteration` steps, on the curve of the budget strategy from `first`
 /// at its start to `limit`.

@@ -329,6 +329,7 @@ struct Trainer::Impl {
   std::uint64_t reflected_rays = 0;  // by mirrors, in the views of the step
   std::deque<SentStep> sent;         // the oldest first
   bool await_sizes = false;          // of the next step: its view had too little room
+  std::uint64_t made_again = 0;      // steps that had
   bool cap_reported = false;
   std::int64_t timed_steps = 0;         // whose kernels were timed
   std::uint64_t skipped_before = 0;     // updates of Adam, before resume()

@@ -55,6 +55,7 @@ void Trainer::Impl::rewind() {
   adam.set_steps(sent.front().optimiser_steps);
   traced_rays = sent.front().traced_rays;
   pass_due = false;  // density control waits for all steps before it
+  ++made_again;
   sent.clear();
   tracer.clear_overflow();
   await_sizes = true;

@@ -25,6 +25,8 @@ constexpr int kLeastSteps = 3;           // of a kind that are timed
 constexpr int kViews = 6;                // that they show
 constexpr double kCoarseShare = 0.2;     // of the time for steps that coarse ones take
 constexpr double kFullShare = 0.5;       // and these together with those at full size
+constexpr double kManyShare = 0.7;       // and with those of many Gaussians
+constexpr double kMostEnlarged = 4;      // by which axes of Gaussians are made longer, or shorter
 constexpr int kMostPasses = 12;          // that double the count
 constexpr std::int64_t kLeastIterations = 10;
 constexpr double kShortRun = 20;      // seconds of a run that is not worth long measuring
@@ -61,19 +63,28 @@ double mean_pixels(const std::vector<Camera>& cameras) {
   return sum / static_cast<double>(cameras.size());
 }
 
+// The same Gaussians, larger or smaller, so that rays meet about so many times as many of them.
+DeviceGaussians enlarged(Context& context, const DeviceGaussians& gaussians, double times) {
+  const double longer = std::clamp(std::sqrt(times), 1 / kMostEnlarged, kMostEnlarged);
+  Gaussians model = gaussians.download();
+  for (float& s : model.log_scales) s += static_cast<float>(std::log(longer));
+  return DeviceGaussians::upload(context, model, gaussians.activation);
+}
+
 }  // namespace
 
 // What a small run of the same shape told.
 struct Trainer::Impl::Pilot {
-  double per_work = 0;       // seconds of a unit of work
-  LoadRates at_start;        // of the first steps
-  LoadRates at_full_size;    // of the steps that are most like those of the end
-  double start_seconds = 0;  // of making the first model
-  double photo_seconds = 0;  // that a photo adds to the run
-  double seconds = 0;        // all of it
-  double body_share = 1;     // of the photos' pixels
-  std::size_t first = 0;     // Gaussians of the start
-  std::size_t most = 0;      // that it may have had
+  double per_work = 0;               // seconds of a unit of work
+  LoadRates at_start;                // of the first steps
+  LoadRates at_full_size;            // of the steps that are most like those of the end
+  double trained_hits = 0;           // per pixel, at the end
+  double start_seconds = 0;          // of making the first model
+  double photo_seconds = 0;          // that a photo adds to the run
+  double seconds = 0;                // all of it
+  std::optional<double> body_share;  // of the photos' pixels, where they are cut out
+  std::size_t first = 0;             // Gaussians of the start
+  std::size_t most = 0;              // that it may have had
 };
 
 void Trainer::Impl::check_not_begun(const char* function) const {
@@ -100,7 +111,7 @@ double Trainer::Impl::predicted_seconds(const Pilot& pilot,
   const double first = std::min(static_cast<double>(pilot.first), kFillShare * limit);
   const auto photos = static_cast<double>(
       std::min(iterations * options.views_per_step, static_cast<std::int64_t>(train_views.size())));
-  const RateCurve rates = expected_rates(pilot.at_start, pilot.at_full_size, pilot.body_share);
+  const RateCurve rates = expected_rates(pilot.at_start, pilot.at_full_size, pilot.trained_hits);
   return pilot.start_seconds + photos * pilot.photo_seconds +
          pilot.per_work * run_work(shaped, options.views_per_step * mean_pixels(train_cameras),
                                    rates, first, limit);
@@ -134,11 +145,13 @@ StepSample Trainer::Impl::PilotSteps::step() {
     impl.context.finish();
     if (read.insert(view).second) photo_seconds += photo.seconds();
   }
+  const std::uint64_t made_again = impl.made_again;
   const Timer timer(impl.context);
   impl.send_step();
   impl.finish_steps();
   const double seconds_of_step = timer.seconds();
   spent += seconds_of_step;
+  const bool counts = impl.made_again == made_again;  // it had room enough
   // Its views are taken to be like the last one.
   const auto views = static_cast<double>(impl.slots.size());
   const auto work = impl.tracer.statistics();
@@ -146,7 +159,7 @@ StepSample Trainer::Impl::PilotSteps::step() {
       {views * static_cast<double>(pixel_count(camera)), static_cast<double>(impl.gaussians.count),
        static_cast<double>(sh_coefficients(impl.gaussians.active_sh_degree)),
        views * static_cast<double>(work.hits), views * static_cast<double>(work.candidates)},
-      seconds_of_step};
+      impl.ranks.broadcast_value(0, counts ? seconds_of_step : 0)};
 }
 
 // Times steps of one kind until the share `until` of the time is spent. The first step of a kind
@@ -156,10 +169,13 @@ LoadRates Trainer::Impl::PilotSteps::stage(double until) {
   const std::int64_t first_step = impl.iteration;
   step();
   const std::size_t begin = samples.size();
+  int counted = 0;
   // The first rank's clock counts for all.
-  for (int i = 0; i < kLeastSteps || impl.ranks.broadcast_value(0, spent < until * seconds); ++i) {
+  for (int i = 0; counted < kLeastSteps || impl.ranks.broadcast_value(0, spent < until * seconds);
+       ++i) {
     impl.iteration = first_step + i % kViews;
     samples.push_back(step());
+    counted += samples.back().seconds > 0 ? 1 : 0;
   }
   const std::span<const StepSample> own = std::span(samples).subspan(begin);
   const LoadRates met = LoadRates::of(own);
@@ -174,7 +190,12 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
   PilotSteps steps{*this, seconds, pilot};
   iteration = 0;
   reads_ahead = false;
-  pilot.at_start = pilot.at_full_size = steps.stage(kCoarseShare);
+  const auto note = [&](const LoadRates& met) {
+    pilot.at_full_size = met;
+    pilot.trained_hits = trained_hits(met.hits, pilot.body_share);
+  };
+  pilot.at_start = steps.stage(kCoarseShare);
+  note(pilot.at_start);
   const auto rough = [&](std::int64_t iterations) {
     return predicted_seconds(pilot, iterations, gaussians.count);
   };
@@ -183,13 +204,22 @@ void Trainer::Impl::time_steps(double seconds, std::optional<double> run, Pilot&
   if (!run && expected < kShortRun)
     steps.seconds = std::min(seconds, steps.spent + kBriefShare * expected);
   iteration = options.iterations / 2;
-  pilot.at_full_size = steps.stage(kFullShare);
+  note(steps.stage(kFullShare));
   const std::size_t most =
       most_gaussians(run ? iterations_within(*run, kLeastIterations, rough) : options.iterations);
   for (int pass = 0; pass < kMostPasses && density.accumulates_at(0) && gaussians.count < most;
        ++pass)
     apply_plan(density.split_evenly(gaussians, most));
-  pilot.at_full_size = steps.stage(1);
+  note(steps.stage(run ? kManyShare : 1));
+  // A run by time is planned by steps that meet as many as those of its end, since what a hit costs
+  // beside all else differs among devices. Where the largest overlap they may take longer than the
+  // end's: a run of too few iterations goes on, one of too many ends with rates that are still
+  // high.
+  const bool has_time = ranks.broadcast_value(0, run && steps.spent < seconds);
+  if (has_time && pilot.at_full_size.hits > 0) {
+    gaussians = enlarged(context, gaussians, pilot.trained_hits / pilot.at_full_size.hits);
+    pilot.at_full_size = steps.stage(1);
+  }
   spdlog::debug(
       "the last {} of {} timed steps took {:.3g} us a unit of work; {:.3g} hits a pixel and {:.3g} "
       "candidates a Gaussian at first, {:.3g} and {:.3g} with {} Gaussians; a photo is read in "

@@ -77,6 +77,7 @@ bool Trainer::Impl::sum_views() {
       guard.close(adam.refused(), gaussians.count);
       tracer.clear_overflow();
       await_sizes = true;
+      ++made_again;
       return false;
     }
     guard.set_step_capped(sum_of_all.capped_rays);

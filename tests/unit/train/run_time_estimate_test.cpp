@@ -107,6 +107,8 @@ TEST_CASE("a run by time names its length, and a replay of its configuration giv
   CHECK(replayed.iterations == estimate.iterations);
   CHECK(replayed.end_iteration == summary.iterations);  // once the last steps were timed
   CHECK(replayed.max_gaussians == static_cast<std::int64_t>(estimate.gaussians));
+  CHECK_FALSE(replayed.photo_points);  // which would take a part of so short a time
+  CHECK(replayed.uncovered_points);
   Trainer again(shared_test_context(), load_dataset(data), replayed, folder.path() / "again");
   again.run(false);
   check_equal(trainer.model(), again.model());

@@ -85,17 +85,20 @@ TEST_CASE("a run by time ends with its time, and has some last steps at any rate
 }
 
 TEST_CASE("rates rise to what trained models have [small] [tiny]") {
-  const RateCurve thin = expected_rates({9, 0.5}, {8, 1}, 1.0);
-  CHECK(thin.first.hits == 9);
-  CHECK(thin.first.candidates == 0.5);
-  CHECK(thin.last.hits > 40);
-  CHECK(thin.last.candidates > 1);
-  CHECK(thin.last.candidates < 1.3);
-  const RateCurve dense = expected_rates({190, 1}, {135, 1}, 1.0);
-  CHECK(dense.last.hits > 60);
-  CHECK(dense.last.hits < 135);
-  CHECK(expected_rates({9, 1}, {8, 1}, 0.25).last.hits == doctest::Approx(0.25 * thin.last.hits));
-  CHECK(expected_rates({0, 0}, {0, 0}, 1.0).last.hits == 0);
+  const double usual = trained_hits(8, {});
+  CHECK(usual > 40);
+  CHECK(trained_hits(usual, {}) == doctest::Approx(usual));
+  CHECK(trained_hits(4 * usual, {}) == doctest::Approx(2 * usual));
+  const double of_body = trained_hits(8, 1.0);
+  CHECK(of_body < usual);
+  CHECK(trained_hits(8, 0.25) == doctest::Approx(0.25 * of_body));
+  CHECK(trained_hits(0, {}) == 0);
+  const RateCurve rates = expected_rates({9, 0.5}, {75, 1}, 80);
+  CHECK(rates.first.hits == 9);
+  CHECK(rates.first.candidates == 0.5);
+  CHECK(rates.last.hits == 80);
+  CHECK(rates.last.candidates >= 1);
+  CHECK(rates.last.candidates < 1.3);
   const LoadRates both =
       LoadRates::of(std::vector<StepSample>{{{100, 10, 1, 300, 5}, 1}, {{300, 30, 1, 500, 15}, 1}});
   CHECK(both.hits == doctest::Approx(2));
