@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
@@ -33,6 +34,8 @@ constexpr double kMostStep = 65535.0;
 /// Gaussians for each thousand of which there are a thousand entries of the palette.
 constexpr std::size_t kPaletteUnit = 1024;
 constexpr std::size_t kMostUnits = 64;
+/// Gaussians from which on the palette takes so long that one is told.
+constexpr std::size_t kToldFrom = 200'000;
 
 /// An opaque texture with room for `count` texels, nearly square with sides in fours.
 Texture blank(std::size_t count) {
@@ -141,8 +144,12 @@ Json add_harmonics(const Gaussians& model, NamedFiles& files) {
     vectors.insert(vectors.end(), begin, begin + static_cast<std::ptrdiff_t>(width));
   }
   const std::size_t units = std::bit_floor(std::max<std::size_t>(1, count / kPaletteUnit));
-  const VectorPalette palette =
-      vector_palette(vectors, width, std::min(kMostUnits, units) * kPaletteUnit);
+  const std::size_t most = std::min(kMostUnits, units) * kPaletteUnit;
+  if (count >= kToldFrom) {
+    spdlog::info("grouping the SH bands of {} Gaussians into a palette of {}: this takes a while",
+                 count, most);
+  }
+  const VectorPalette palette = vector_palette(vectors, width, most);
   const std::size_t entries = palette.entries.size() / width;
   const std::vector<float> levels = best_levels(palette.entries, kSogLevels);
 
