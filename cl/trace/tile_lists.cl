@@ -154,6 +154,25 @@ bool box_outside(const RsCamera* camera, const float4 tile, __global const RsAab
   return false;
 }
 
+// Box of the tangent coordinates of all tiles that a launch may fill, whatever its window. Most of
+// what the camera plane cuts lies beside it, so that none of its tiles has to be asked.
+#if LENS
+float4 picture_box(const LensTiles* lens) {
+  float4 box = (float4)(INFINITY, INFINITY, -INFINITY, -INFINITY);
+  for (int y = 0; y < lens->tile_rows; ++y) {
+    const float4 row = lens->spans[y];
+    box = (float4)(fmin(box.xy, row.xy), fmax(box.zw, row.zw));
+  }
+  return box;
+}
+#else
+float4 picture_box(const RsCamera* camera) {
+  const float4 first = tile_box(camera, 0, 0);
+  const float4 last = tile_box(camera, (camera->width - 1) / TILE, (camera->height - 1) / TILE);
+  return (float4)(first.xy, last.zw);
+}
+#endif
+
 #if LENS
 // Whether a tile belongs to the face and its box meets the outline, of which lane `lane` is asked.
 bool lens_tile_meets(const LensTiles* lens,
@@ -194,9 +213,12 @@ __kernel void count_tiles(const uint begin,
   TileRanges range;
   IntLanes empty;
   empty.v = tile_ranges(b, &lens, window, &range);
+  const float4 picture = picture_box(&lens);
   for (int lane = 0; lane < LANES; ++lane) {
     uint found = 0;
-    if (empty.s[lane] == 0) {
+    const bool none = empty.s[lane] != 0 || (outline[RS_BOUNDS_X0].s[lane] == -INFINITY &&
+                                             box_outside(&camera, picture, boxes + i + lane));
+    if (!none) {
       for (int y = range.y0.s[lane]; y <= range.y1.s[lane]; ++y) {
         for (int x = range.x0.s[lane]; x <= range.x1.s[lane]; ++x)
           found += lens_tile_meets(&lens, x, y, outline, lane, &camera, boxes + i + lane);
@@ -210,6 +232,7 @@ uint tiles_of_box(const TileRanges* range,
                   const int lane,
                   const RsCamera* camera,
                   __global const RsAabb* box) {
+  if (box_outside(camera, picture_box(camera), box)) return 0;
   uint found = 0;
   for (int y = range->y0.s[lane]; y <= range->y1.s[lane]; ++y) {
     for (int x = range->x0.s[lane]; x <= range->x1.s[lane]; ++x)
@@ -340,7 +363,11 @@ __kernel void fill_tiles(const uint begin,
   IntLanes x, y, key, left;
   x.v = range.x0.v;
   y.v = range.y0.v;
-  for (left.v = !empty; rs_any_of(left.v); left.v = left.v & (y.v <= range.y1.v)) {
+  left.v = !empty;
+  // Those that were counted in no tile.
+  for (int lane = 0; lane < LANES; ++lane)
+    left.s[lane] = offsets[i + lane + 1] == offsets[i + lane] ? 0 : left.s[lane];
+  for (; rs_any_of(left.v); left.v = left.v & (y.v <= range.y1.v)) {
 #if LENS
     FloatLanes edge[4];
     for (int lane = 0; lane < LANES; ++lane) {

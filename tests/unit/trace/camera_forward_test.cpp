@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <glm/matrix.hpp>
 #include <limits>
 
@@ -285,6 +287,33 @@ TEST_CASE("a camera inside the scene: means beside and behind it, ellipsoids aro
       options.hit_order = order;
       check_against_reference(context, model, options, camera);
       options.packet_shape = PacketShape::kGroup;
+      check_against_reference(context, model, options, camera);
+    }
+  }
+}
+
+TEST_CASE("what the camera plane cuts beside the picture is in no list, else it is seen") {
+  Context context = make_test_context();
+  Camera camera;  // sees x / z from -1 to 4
+  camera.width = 100;
+  camera.height = 40;
+  camera.fx = camera.fy = 20;
+  camera.cx = camera.cy = 20;
+  Gaussians model = reference::random_scene(1, 9, 0);
+  std::fill(model.log_scales.begin(), model.log_scales.end(), std::log(0.1f));
+  for (const float x : {-1.5f, 1.0f}) {
+    for (const Packet& packet : packets({1, 8}, {32})) {
+      CAPTURE(x);
+      CAPTURE(packet);
+      std::copy_n(std::array{x, 0.0f, 0.0f}.begin(), 3, model.means.begin());
+      const TraceOptions options = packet.over({});
+      const DeviceGaussians gaussians =
+          DeviceGaussians::upload(context, model, ScaleActivation::kExp);
+      CameraTracer tracer(context, options);
+      tracer.update(gaussians);
+      tracer.forward(gaussians, camera);
+      CHECK((tracer.statistics().candidates > 0) == (x > 0));
+      CHECK((tracer.statistics().hits > 0) == (x > 0));
       check_against_reference(context, model, options, camera);
     }
   }
