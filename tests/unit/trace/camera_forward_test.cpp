@@ -305,7 +305,7 @@ TEST_CASE("what the camera plane cuts beside the picture is in no list, else it 
     for (const Packet& packet : packets({1, 8}, {32})) {
       CAPTURE(x);
       CAPTURE(packet);
-      std::copy_n(std::array{x, 0.0f, 0.0f}.begin(), 3, model.means.begin());
+      model.means = {x, 0.0f, 0.0f};
       const TraceOptions options = packet.over({});
       const DeviceGaussians gaussians =
           DeviceGaussians::upload(context, model, ScaleActivation::kExp);
