@@ -13,7 +13,7 @@
       __global const float *restrict scales, __global const float *restrict opacities, \
       __global const float *restrict sh
 
-// Gradients of the parameters, and what density control reads of them (3 floats a Gaussian).
+// Gradients of the parameters, and what density control reads of them (4 floats a Gaussian).
 #define RS_GRADIENT_ARGUMENTS                                                  \
   __global float *restrict g_means, __global float *restrict g_quaternions,    \
       __global float *restrict g_scales, __global float *restrict g_opacities, \

@@ -88,7 +88,7 @@ __kernel void finalize_gradients(RS_FINALIZE_ARGUMENTS) {
     clear_columns(g_scales + 3 * i, 3);
     clear_columns(g_opacities + i, 1);
     clear_columns(g_sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS);
-    clear_columns(screen + 3 * i, 3);
+    clear_columns(screen + 4 * i, 4);
 #if POSE
     clear_columns(pose + 6 * i, 6);
 #endif
@@ -108,12 +108,12 @@ __kernel void finalize_gradients(RS_FINALIZE_ARGUMENTS) {
   axis_footprint_gradient(&g, v[12], &view, &rest);
   mean_footprint_gradient(&g, &rest, &view);
 #endif
-  fv seen[3];
+  fv seen[4];
   screen_statistics(&g, v, touched, kind, finalize.screen_x, finalize.screen_y, seen);
 #if ACCUMULATE
-  fv before[3], old_means[3], old_quaternions[4], old_scales[3], old_opacities[1];
+  fv before[4], old_means[3], old_quaternions[4], old_scales[3], old_opacities[1];
   fv old_sh[3 * SH_COEFFICIENTS];
-  load_columns3(screen + 3 * i, before);
+  load_columns4(screen + 4 * i, before);
   load_rows(g_means + 3 * i, 3, old_means);
   load_rows(g_quaternions + 4 * i, 4, old_quaternions);
   load_rows(g_scales + 3 * i, 3, old_scales);
@@ -122,8 +122,9 @@ __kernel void finalize_gradients(RS_FINALIZE_ARGUMENTS) {
   seen[0] += before[0];
   seen[1] += before[1];
   seen[2] = larger(seen[2], before[2]);
+  seen[3] += before[3];
 #endif
-  store_columns3(seen[0], seen[1], seen[2], screen + 3 * i);
+  store_columns4(seen, screen + 4 * i);
 
   ColorGradient color;
   color_gradient(g.offset, line, v, touched, &color);

@@ -197,15 +197,16 @@ RS_FINALIZE_WAVE __attribute__((reqd_work_group_size(GROUP, 1, 1))) __kernel voi
   take_shape_gradient(line, kind, v);
   ViewGaussian g;
   load_view_gaussian(i, means, quaternions, scales, opacities, &camera, &g);
-  float seen[3];
+  float seen[4];
   screen_statistics(&g, v, touched, kind, finalize.screen_x, finalize.screen_y, seen);
 #if ACCUMULATE
-  seen[0] += screen[3 * i];
-  seen[1] += screen[3 * i + 1];
-  seen[2] = larger(seen[2], screen[3 * i + 2]);
+  seen[0] += screen[4 * i];
+  seen[1] += screen[4 * i + 1];
+  seen[2] = larger(seen[2], screen[4 * i + 2]);
+  seen[3] += screen[4 * i + 3];
 #endif
-  for (int j = 0; j < 3; ++j) row[j] = seen[j];
-  stage_store(&staged, 0, 3, screen + 3 * first, 3, 0, 0);
+  for (int j = 0; j < 4; ++j) row[j] = seen[j];
+  stage_store(&staged, 0, 4, screen + 4 * first, 4, 0, 0);
 
   ViewGradient view;
   park(row, &g, out.mean);

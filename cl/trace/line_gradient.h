@@ -4,6 +4,7 @@
 #define RS_TRACE_LINE_GRADIENT_H
 
 #include "trace/backward_scene.h"
+#include "trace/least_weight.h"
 
 // What a pixel gains from each unit of T alpha that a Gaussian blends.
 fv rs_projected(const Pixels* p, __global const float* v, const PacketMeeting* m) {
@@ -18,7 +19,14 @@ fv rs_projected(const Pixels* p, __global const float* v, const PacketMeeting* m
 
 // Numbers RS_PROJECTIVE_END to 11 of the gradient of a projective line are 0: there is nothing to
 // add.
-#define RS_PROJECTIVE_END (DEPTH_GRADIENT ? 10 : 9)
+#define RS_PROJECTIVE_END (DEPTH_GRADIENT ? 11 : 10)
+
+// By how much a ray blends more than LEAST_WEIGHT of a Gaussian, 0 where it blends nothing or its
+// pixel has no gradient.
+fv rs_beyond_least(const Pixels* p, const fv weight) {
+  const fv told = fabs(p->gR) + fabs(p->gG) + fabs(p->gB) + fabs(p->gA);
+  return select((fv)(0.0f), weight - LEAST_WEIGHT, RS_MASK(fmin(weight, told) > 0.0f));
+}
 
 #if LENS == RS_LENS_AROUND
 // Length of a gradient with respect to the angle in which the mean at (x, y) is seen, from that
@@ -51,10 +59,9 @@ void line_gradient_projective(
   gN -= through_D * v[8] * inverse;
   g_toward += g_near * v[2] * inverse - 2.0f * through_D * near;
   g_kappa -= through_D * distance2;
-  g[9] = g_near * near;
-#else
-  (void)weight;
+  g[10] = g_near * near;
 #endif
+  g[9] = rs_beyond_least(p, weight);
   // N is the sum of the squares of p dx + q dy and of r dy.
   const fv gU = 2.0f * gN * (v[3] * dx + v[4] * dy), gV = 2.0f * gN * (v[5] * dy);
   g[0] = -(gU * v[3] + g_toward * v[6]);

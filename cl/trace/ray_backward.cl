@@ -21,6 +21,7 @@
 //   EXACT_SUMS 1:     one copy of long integers (exact_sum.h): the same sum in any order
 //   otherwise:        one copy of shared floats (float_add.h)
 #include "parallel/wave.h"
+#include "trace/least_weight.h"
 #include "trace/line_sum.h"
 #include "trace/ray_color.h"
 #include "trace/ray_sums.h"
@@ -71,10 +72,12 @@ typedef struct {
 #endif
 } RayState;
 
-// What a hit brings to the line of its Gaussian, but for the colour: `by_alpha` = dL/dalpha.
+// What a hit brings to the line of its Gaussian, but for the colour: `before` is the transmittance
+// in front of it, `by_alpha` = dL/dalpha.
 RS_SHARE float16 line_sums(const RayData* ray,
                            const float16 record,
                            const float alpha,
+                           const float before,
                            const float by_alpha,
                            RayState* state) {
   const float3 x = record.s012, y = record.s345, z = record.s678;  // rows of M = S^-1 R^T
@@ -101,6 +104,7 @@ RS_SHARE float16 line_sums(const RayData* ray,
   sum.s8 = g * v.z * v.z;
   sum.s9 = alpha * by_alpha;
   sum.sa = sqrt(dot(on_screen, on_screen));
+  sum.sb = before * alpha - LEAST_WEIGHT;
   return sum;
 }
 
@@ -149,6 +153,7 @@ RS_INLINE void add_hit(const RayScene* scene,
                        const float* basis,
                        const Pending* pending,
                        const int k,
+                       const float before,
                        const float by_alpha,
                        const float3 by_color,
                        RayState* state) {
@@ -157,16 +162,16 @@ RS_INLINE void add_hit(const RayScene* scene,
   float16 sum = (float16)(0.0f);
 #if SH_DEGREE == 0
   (void)basis;
-  sum.sbcd = by_color;
-  rs_add_numbers(&state->sums, line, sum, 11, 14);
+  sum.scde = by_color;
+  rs_add_numbers(&state->sums, line, sum, 12, 15);
 #else
   add_coefficients(&state->sums, index, basis, by_color);
   if (WITH_RAY_GRADIENT || scene->color_from_origin) {
     const float4 n = color_direction(scene, ray, pending, k);
     const float3 by_way = direction_gradient_of(scene, index, n.xyz, n.w, by_color);
     if (scene->color_from_origin) {
-      sum.sbcd = by_way;
-      rs_add_numbers(&state->sums, line, sum, 11, 14);
+      sum.scde = by_way;
+      rs_add_numbers(&state->sums, line, sum, 12, 15);
 #if WITH_RAY_GRADIENT
       state->by_origin -= by_way;
     } else {
@@ -176,8 +181,8 @@ RS_INLINE void add_hit(const RayScene* scene,
   }
 #endif
   const float16 record = *(__global const float16*)(state->records + (size_t)index * 16);
-  sum = line_sums(ray, record, pending_alpha(pending, k), by_alpha, state);
-  rs_add_numbers(&state->sums, line, sum, 0, 11);
+  sum = line_sums(ray, record, pending_alpha(pending, k), before, by_alpha, state);
+  rs_add_numbers(&state->sums, line, sum, 0, 12);
 }
 
 // Blends the hits from the nearest on: what lies behind each is the known result minus what is
@@ -204,7 +209,7 @@ RS_INLINE void blend_hits(const RayScene* scene,
     const float behind =
         state->stopped ? dot(state->background, gradient) : state->behind / state->transmittance;
     const float3 by_color = passed_to(color, before * alpha * gradient);
-    add_hit(scene, ray, basis, pending, k, before * (projected - behind), by_color, state);
+    add_hit(scene, ray, basis, pending, k, before, before * (projected - behind), by_color, state);
   }
 }
 #else
@@ -215,15 +220,16 @@ RS_INLINE void add_hit(const RayScene* scene,
                        const float* basis_of_ray,
                        const uint index,
                        const float alpha,
+                       const float before,
                        const float by_alpha,
                        const float3 by_color,
                        RayState* state) {
   const float16 record = *(__global const float16*)(state->records + (size_t)index * 16);
-  float16 sum = line_sums(ray, record, alpha, by_alpha, state);
+  float16 sum = line_sums(ray, record, alpha, before, by_alpha, state);
 #if SH_DEGREE == 0
   (void)scene;
   (void)basis_of_ray;
-  sum.sbcd = by_color;
+  sum.scde = by_color;
 #else
   float own_basis[RS_RAY_FUNCTIONS];
   const float* basis = basis_of_ray;
@@ -233,9 +239,9 @@ RS_INLINE void add_hit(const RayScene* scene,
     const float3 n = -inverse * offset;
     rs_sh_basis(SH_DEGREE, n.x, n.y, n.z, own_basis);
     basis = own_basis;
-    sum.sbcd = direction_gradient_of(scene, index, n, inverse, by_color);
+    sum.scde = direction_gradient_of(scene, index, n, inverse, by_color);
 #if WITH_RAY_GRADIENT
-    state->by_origin -= sum.sbcd;
+    state->by_origin -= sum.scde;
 #endif
   }
 #if WITH_RAY_GRADIENT
@@ -288,8 +294,8 @@ RS_INLINE void blend_hits(const RayScene* scene,
     const float3 color = pending->color[i].xyz;
     const float projected = dot(color, gradient) + state->gradient.w;
     const float3 by_color = passed_to(color, before[i] * alpha * gradient);
-    add_hit(scene, ray, basis, pending->index[i], alpha, before[i] * (projected - behind), by_color,
-            state);
+    add_hit(scene, ray, basis, pending->index[i], alpha, before[i],
+            before[i] * (projected - behind), by_color, state);
     behind = alpha * projected + (1.0f - alpha) * behind;
   }
 }

@@ -101,7 +101,7 @@ __kernel void finish_ray_gradients(const uint begin,
     clear_columns(g_scales + 3 * i, 3);
     clear_columns(g_opacities + i, 1);
     clear_columns(g_sh + i * 3 * SH_COEFFICIENTS, 3 * SH_COEFFICIENTS);
-    clear_columns(screen + 3 * i, 3);
+    clear_columns(screen + 4 * i, 4);
     return;
   }
 
@@ -129,14 +129,15 @@ __kernel void finish_ray_gradients(const uint begin,
   fv distance = 1.0f;
   if (shares.screen[12] == 0.0f) distance = sqrt(distance2);
   if (shares.screen[12] == 1.0f) distance = larger(along, zero);
-  store_columns3(touched ? sqrt(length2) * distance : zero, touched ? v[10] * distance : zero,
-                 touched ? (fv)(1.0f) : zero, screen + 3 * i);
+  const fv seen[4] = {touched ? sqrt(length2) * distance : zero, touched ? v[10] * distance : zero,
+                      touched ? (fv)(1.0f) : zero, touched ? v[11] : zero};
+  store_columns4(seen, screen + 4 * i);
 
   fv c[3 * SH_COEFFICIENTS];
 #if SH_DEGREE == 0
-  for (int j = 0; j < 3; ++j) c[j] = touched ? RS_SH0 * v[11 + j] : zero;
+  for (int j = 0; j < 3; ++j) c[j] = touched ? RS_SH0 * v[12 + j] : zero;
 #else
-  for (int j = 0; j < 3; ++j) mean[j] += v[11 + j];
+  for (int j = 0; j < 3; ++j) mean[j] += v[12 + j];
   for (int k = 0; k < RS_RAY_FUNCTIONS; ++k) {
     for (int j = 0; j < 3; ++j) {
       c[3 * k + j] = touched ? v[RS_RAY_SH + j * RS_RAY_FUNCTIONS + k] : zero;

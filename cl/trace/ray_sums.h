@@ -7,7 +7,8 @@
 //   9       alpha times dL/dalpha: dL/d(logit) divided by 1 - opacity
 //   10      lengths of the rays' gradients on the screen, the densification signal of AbsGS (Ye et
 //           al. 2024)
-//   11..13  SH degree 0: dL/dcolour. Above: dL/dmean through the direction of the colour
+//   11      by how much the rays that meet it blend more than LEAST_WEIGHT of it
+//   12..14  SH degree 0: dL/dcolour. Above: dL/dmean through the direction of the colour
 //   16..    SH degree above 0: dL/dcolour times basis, all functions of red, then green, then blue
 #ifndef RS_TRACE_RAY_SUMS_H
 #define RS_TRACE_RAY_SUMS_H

@@ -62,7 +62,7 @@ void projective_gradient(const ViewGaussian* g, const fv* v, ViewGradient* out) 
   }
   out->m[0] += v[0] * iz;
   out->m[1] += v[1] * iz;
-  out->m[2] += (v[9] - (v[0] * mx + v[1] * my) * iz) * iz;
+  out->m[2] += (v[10] - (v[0] * mx + v[1] * my) * iz) * iz;
 }
 
 // Writes the general gradient in place of the projective one, in the lanes where `general` holds.
@@ -95,9 +95,9 @@ void view_gradient(
   if (rs_any_of(touched & general)) general_gradient(g, v, general, out);
 }
 
-// Turns the gradients of p, q, r, e_x, e_y, kappa and m_z of a projective line, v[3..9], into those
-// of what they are made of (prepare_view.cl), n = -o' being the whitened mean, u_x = n x M_0 and
-// u_y = n x M_1: twice that of |u_x|^2, that of <u_x, u_y>, r dL/dr, those of <n, M_0> and
+// Turns the gradients of p, q, r, e_x, e_y, kappa and m_z of a projective line, v[3..8] and v[10],
+// into those of what they are made of (prepare_view.cl), n = -o' being the whitened mean, u_x = n x
+// M_0 and u_y = n x M_1: twice that of |u_x|^2, that of <u_x, u_y>, r dL/dr, those of <n, M_0> and
 // <n, M_1>, twice that of |n|^2, and m_z dL/dm_z.
 void take_shape_gradient(const fv* line, const iv kind, fv* v) {
   const iv projective = kind == RS_LINE_PROJECTIVE;
@@ -114,14 +114,15 @@ void take_shape_gradient(const fv* line, const iv kind, fv* v) {
   const fv by_scale = by_p + by_q;  // of m_z / |n|
   v[8] = projective ? -(by_scale + 2.0f * (line[8] * v[8] + by_slopes)) * line[8] : v[8];
 #if DEPTH_GRADIENT
-  const fv by_depth = line[2] * v[9];
+  const fv by_depth = line[2] * v[10];
 #else
   const fv by_depth = 0;
 #endif
-  v[9] = projective ? by_scale + by_slopes + 2.0f * by_r + by_depth : v[9];
+  v[10] = projective ? by_scale + by_slopes + 2.0f * by_r + by_depth : v[10];
 }
 
-// What density control reads: screen gradient, the sum of its absolute values, 1 where a ray met.
+// What density control reads: screen gradient, the sum of its absolute values, 1 where a ray met,
+// and by how much rays blend more than LEAST_WEIGHT.
 void screen_statistics(const ViewGaussian* g,
                        const fv* v,
                        const iv touched,
@@ -144,6 +145,7 @@ void screen_statistics(const ViewGaussian* g,
   out[0] = counts ? on_screen : zero;
   out[1] = counts ? v[2] : zero;
   out[2] = touched ? (fv)(1.0f) : zero;
+  out[3] = counts ? v[9] : zero;
 }
 
 // What the colour of a Gaussian depends on: its direction n = (m - c) / |m - c| and max(0, .),

@@ -41,13 +41,13 @@
 // Per pixel: gradient of R, G, B, A and two transmittances. Streams come on top.
 #define RS_WORK_BACKWARD_PIXEL_BYTES 24
 // Per hit: geometry 19, response 19, transmittance 2, colour and suffix 12; the line's gradient:
-// geometry 19, chain 39, sum over rays 13.
-#define RS_WORK_BACKWARD_FLOPS 123
+// geometry 19, chain 43, sum over rays 14.
+#define RS_WORK_BACKWARD_FLOPS 128
 
 // finalize_gradients, per Gaussian: line gradient 64, shape and colours of the line 40, bounds 32,
-// parameters 44 read; gradients 44 and statistics 12 written. SH coefficients come on top, 12 read
+// parameters 44 read; gradients 44 and statistics 16 written. SH coefficients come on top, 12 read
 // and 12 written each.
-#define RS_WORK_FINALIZE_BYTES 236
+#define RS_WORK_FINALIZE_BYTES 240
 // Parameters as in prepare_view 123, line to camera axes 132, rotation and quaternion 80, scales
 // 15, opacity 3, screen statistics 10, direction 20.
 #define RS_WORK_FINALIZE_FLOPS 383

@@ -4,7 +4,7 @@
 // in one buffer, each with room for `rows` Gaussians, and so do the second.
 //
 // A Gaussian with a gradient that is not finite keeps its parameters and moments and is counted;
-// with visible_only so does, uncounted, one that no ray met (screen[3 i + 2] == 0). A guard word
+// with visible_only so does, uncounted, one that no ray met (screen[4 i + 2] == 0). A guard word
 // that is not 0 turns the whole step off (train/step_guard.cl).
 #include "parallel/vector_lanes.h"
 #include "train/parameter_groups.h"
@@ -72,7 +72,7 @@ __kernel void choose_steps(const __global float* means,
   }
   barrier(CLK_LOCAL_MEM_FENCE);
   for (size_t i = first + get_local_id(0); i < last; i += GROUP) {
-    const bool taken = open && (!visible_only || screen[3 * i + 2] != 0.0f);
+    const bool taken = open && (!visible_only || screen[4 * i + 2] != 0.0f);
     const bool poisoned = bad[i - first] != 0;
     steps[i] = taken && !poisoned;
     if (taken && poisoned) atomic_inc(skipped);

@@ -22,9 +22,10 @@
 #define HALF_OPACITY 0.6f
 #endif
 
-// statistics: 2 N, {sum of the signal, number of views that saw the Gaussian}; signal 0 = screen, 1
-// = absolute. screen: 3 N, of one view or a sum over views; the third number tells how many saw it.
-// A signal that is not finite is left out; a guard word that is not 0 turns all off.
+// statistics: 3 N, {sum of the signal, number of views that saw the Gaussian, by how much their
+// rays blend more than the least weight}; signal 0 = screen, 1 = absolute. screen: 4 N, of one view
+// or a sum over views; the third number tells how many saw it. A signal that is not finite is left
+// out; a guard word that is not 0 turns all off.
 kernel void accumulate_screen(uint count,
                               uint signal,
                               global const float* screen,
@@ -32,15 +33,16 @@ kernel void accumulate_screen(uint count,
                               global float* statistics) {
   const uint i = get_global_id(0);
   if (i >= count || guard[0] != 0) return;
-  const float views = screen[3 * i + 2];
-  if (views > 0.0f && isfinite(screen[3 * i + signal])) {
-    statistics[2 * i] += screen[3 * i + signal];
-    statistics[2 * i + 1] += views;
+  const float views = screen[4 * i + 2];
+  if (views > 0.0f && isfinite(screen[4 * i + signal])) {
+    statistics[3 * i] += screen[4 * i + signal];
+    statistics[3 * i + 1] += views;
+    statistics[3 * i + 2] += screen[4 * i + 3];
   }
 }
 
-// statistics[i] = {how far the mean has moved since `before`, in units of 1 / inverse_unit; 1}. A
-// guard word that is not 0 turns it off.
+// statistics[i] = {how far the mean has moved since `before`, in units of 1 / inverse_unit; 1; 0}.
+// A guard word that is not 0 turns it off.
 kernel void measure_step(uint count,
                          float inverse_unit,
                          global const float* before,
@@ -50,7 +52,7 @@ kernel void measure_step(uint count,
   const uint i = get_global_id(0);
   if (i >= count || guard[0] != 0) return;
   const float way = inverse_unit * distance(vload3(i, means), vload3(i, before));
-  if (isfinite(way)) vstore2((float2)(way, 1.0f), i, statistics);
+  if (isfinite(way)) vstore3((float3)(way, 1.0f, 0.0f), i, statistics);
 }
 
 // Four independent 32-bit words from four (Jarzynski and Olano 2020, "Hash Functions for GPU

@@ -7,7 +7,7 @@
 #define RS_TO(name) g_##name
 
 // Adds the gradients of one view, or of several, to others: of all parameters of `count` Gaussians,
-// and what density control reads, `met`, which is as wide as the means. Launch: a work-item for
+// and what density control reads, `met`, which is as wide as the quaternions. Launch: a work-item for
 // each float of the parameters, in groups as `parts` says. Complexity: O(1) each.
 __kernel void add_gradients(uint count,
                             const RsParts parts,
@@ -19,7 +19,7 @@ __kernel void add_gradients(uint count,
   size_t i = 0, end = 0;
   RS_EACH_PARAMETER_GROUP(RS_CHOOSE_ARRAYS)
   if (i < end) to[i] += from[i];
-  if (rs_works_on(parts, 0) && i < end) screen[i] += met[i];
+  if (rs_works_on(parts, 1) && i < end) screen[i] += met[i];
 }
 
 // sum[i] += numbers[i] for i < count. Launch: one work-item per number. Complexity: O(1) each.

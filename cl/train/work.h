@@ -35,8 +35,8 @@
 #define RS_WORK_MEAN_BYTES 12
 #define RS_WORK_MEAN_FLOPS 3
 
-// Density statistics, per Gaussian: screen record 12 read, sums 8 read and written.
-#define RS_WORK_STATISTICS_BYTES 28
+// Density statistics, per Gaussian: screen record 16 read, sums 12 read and written.
+#define RS_WORK_STATISTICS_BYTES 40
 
 // Density control, per new Gaussian: source and role read (8); per parameter one read and one write
 // (8), 11 parameters beside the SH coefficients.

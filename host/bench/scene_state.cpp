@@ -113,10 +113,11 @@ void SceneBench::Impl::make_gradients() {
         buffer.upload(random_floats(buffer.size(), 1e-3, options.seed, kGradientStream));
       },
       gradients);
-  std::vector<float> screen(3 * count());
-  for (std::size_t i = 0; i < count(); ++i) {
-    screen[3 * i] = screen[3 * i + 1] = 1e-4f;
-    screen[3 * i + 2] = 1.0f;
+  constexpr std::size_t kNumbers = GaussianGradients::kScreenNumbers;
+  std::vector<float> screen(kNumbers * count());
+  for (std::size_t i = 0; i < screen.size(); i += kNumbers) {
+    screen[i] = screen[i + 1] = 1e-4f;
+    screen[i + 2] = 1.0f;
   }
   upload(context, gradients.screen, screen, "screen gradients");
 }
@@ -130,10 +131,10 @@ void SceneBench::Impl::make_density() {
   rules.prune_scale = 0.0;
   rules.max_gaussians = static_cast<std::int64_t>(2 * count());
   density.emplace(context, rules, 1.0, 1);
-  density_signal.resize(2 * count());
+  density_signal.assign(kDensityStatistics * count(), 0.0f);
   for (std::size_t i = 0; i < count(); ++i) {
-    density_signal[2 * i] = i % kDensifyEvery == 0 ? 1.0f : 0.0f;
-    density_signal[2 * i + 1] = 1.0f;
+    density_signal[kDensityStatistics * i] = i % kDensifyEvery == 0 ? 1.0f : 0.0f;
+    density_signal[kDensityStatistics * i + 1] = 1.0f;
   }
 }
 

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <map>
 #include <string>
+#include <type_traits>
 
 namespace raysplats {
 
@@ -13,7 +14,10 @@ class BuildOptions {
  public:
   template <class T>
   BuildOptions& define(const std::string& name, const T& value) {
-    values_[name] = fmt::format("{}", value);
+    if constexpr (std::is_same_v<T, float>)
+      values_[name] = fmt::format("{:.9e}f", value);
+    else
+      values_[name] = fmt::format("{}", value);
     return *this;
   }
   /// A later OpenCL C than 1.2, "CL3.0", where what the device has is part of that only.

@@ -232,6 +232,7 @@ void apply_run_text(CLI::App& app,
     options.uncovered_points = options.photo_points;  // one key had been for both
   if (found.count("color-range") == 0 && !given("color-range")) options.color_range = 1;
   if (found.count("alpha-weight") == 0 && !given("alpha-weight")) options.alpha_weight = 0;
+  if (found.count("prune-weight") == 0 && !given("prune-weight")) options.prune_weight = 0;
   if (found.count("strategy") > 0) return;
   // The run is older than these keys: it goes on as it began.
   if (!given("strategy")) options.strategy = DensityStrategy::kAdc;

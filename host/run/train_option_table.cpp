@@ -398,6 +398,9 @@ void add_density_options(TrainTable& t, TrainOptions& o) {
       "max-gaussians", o.max_gaussians, 0, 2e9,
       "hard limit of the count; the strongest candidates win; 0 = from the photos' pixels, the "
       "iterations and the device's memory");
+  t.number("prune-weight", o.prune_weight, 0, 1,
+           "Gaussians of which the rays that meet them blend less than this on average are removed "
+           "(budget); 0 = none");
   t.number("opacity-decay", o.opacity_decay, kFitted, 0.5,
            "taken off every opacity in each pass of the budget strategy; -1 = 0.01 after a random "
            "start, else 0 up to 100 steps for each photo, rising to 0.01 at 200");

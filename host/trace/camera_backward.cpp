@@ -95,7 +95,7 @@ std::vector<Kernel> CameraTracer::Impl::backward_pass(int lens,
                                                       const GradientSumChoice& choice,
                                                       bool with_depth) {
   BuildOptions build = kernels.build(lens);
-  build.define("DEPTH_GRADIENT", with_depth ? 1 : 0);
+  build.define("DEPTH_GRADIENT", with_depth ? 1 : 0).define("LEAST_WEIGHT", options.least_weight);
   return kernels.backward(choice.define(build, context.device()));
 }
 

@@ -48,7 +48,7 @@ DeviceGaussians DeviceGaussians::upload(Context& context,
 
 void GaussianGradients::ensure(Context& context, const DeviceGaussians& gaussians) {
   Parameters::ensure(context, gaussians.count, gaussians.sh_degree, "gradients");
-  screen.ensure(context, 3 * gaussians.count, "screen gradients");
+  screen.ensure(context, kScreenNumbers * gaussians.count, "screen gradients");
 }
 
 Gaussians DeviceGaussians::download() const {

@@ -36,8 +36,11 @@ struct DeviceGaussians : Parameters {
 struct GaussianGradients : Parameters {
   /// For each Gaussian of a view {norm of the gradient at the projected mean in normalised device
   /// coordinates (as 3DGS), the same from absolute values per ray (as AbsGS), 1 when any ray met it
-  /// else 0}.
-  Buffer<float> screen;  ///< 3 N
+  /// else 0, by how much the rays that met it in pixels with a gradient blend more of it than
+  /// TraceOptions::least_weight, in sum}. Where the ellipsoid reaches the plane of a view's camera
+  /// the first two and the last are 0.
+  static constexpr std::size_t kScreenNumbers = 4;
+  Buffer<float> screen;  ///< 4 N
 
   /// RS_GRADIENT_ARGUMENTS of cl/trace/arguments.h.
   auto arguments() const {

@@ -138,7 +138,8 @@ void RayBackward::add(const DeviceGaussians& gaussians,
   BuildOptions build = ray_walk_build(tree.form(), options, tracer_->near(), degree_);
   sums_.define(build.define("SH_DEGREE", degree_)
                    .define("WITH_RAY_GRADIENT", ray_gradients != nullptr ? 1 : 0)
-                   .define("RAISE_CLAMPED", options.raise_clamped ? 1 : 0));
+                   .define("RAISE_CLAMPED", options.raise_clamped ? 1 : 0)
+                   .define("LEAST_WEIGHT", options.least_weight));
   const std::size_t chunk = shares ? kCpuChunk : 1;
   // Rays that all work-items, or a group of them, take in one turn: bands of whole rows leave every
   // ray with the copy that it would go to without.

@@ -17,6 +17,7 @@
 #include "shared/layout.h"
 #include "shared/light_layout.h"
 #include "trace/candidate_lists.hpp"
+#include "trace/device_gaussians.hpp"
 #include "trace/exact_sum.h"
 #include "trace/gradient_sums.hpp"
 #include "trace/hit_streams.hpp"
@@ -26,6 +27,7 @@
 #include "trace/ray_launch.hpp"
 #include "trace/ray_tree.hpp"
 #include "trace/stream_segments.hpp"
+#include "train/density/density_plan.hpp"
 #include "util/mebibytes.hpp"
 
 namespace raysplats {
@@ -119,21 +121,24 @@ MemoryEstimate estimate_memory(const TrainOptions& options,
                                const DeviceInfo& device) {
   const auto sh = 3 * static_cast<std::size_t>(sh_coefficients(options.sh_degree));
   const std::size_t floats = 3 + 4 + 3 + 1 + sh;
+  constexpr std::size_t kScreen = GaussianGradients::kScreenNumbers;
   const std::size_t exact =
       packet_sums(options, demand.gaussians, device).sum == GradientSum::kExact
           ? 16 * RS_EXACT_WORDS * sizeof(std::uint32_t)
           : 0;
   MemoryEstimate out;
-  // Parameters, gradients, two moments, gradients on the screen (3) and statistics of density
-  // control (2); while the set changes the new parameters, their sources and roles, later the mean
+  // Parameters, gradients, two moments, gradients on the screen and statistics of density
+  // control; while the set changes the new parameters, their sources and roles, later the mean
   // of the parameters in their place; the least scales.
   const std::size_t footprint = options.footprint > 0 ? 1 : 0;
-  out.gaussians = demand.gaussians * (floats * 5 + 5 + 2 + footprint) * sizeof(float);
+  out.gaussians = demand.gaussians * (floats * 5 + kScreen + kDensityStatistics + 2 + footprint) *
+                  sizeof(float);
   // What of the model lies within the box, while that is measured.
   if (options.bounds) out.gaussians += demand.gaussians * floats * sizeof(float);
   // Steps of several views: sums of gradients, one for every level of their tree.
   const auto views = static_cast<std::size_t>(options.views_per_step);
-  out.gaussians += demand.gaussians * (floats + 3) * std::bit_width(views - 1) * sizeof(float);
+  out.gaussians +=
+      demand.gaussians * (floats + kScreen) * std::bit_width(views - 1) * sizeof(float);
   // Line, gradient line and its exact sums, bounds, box, candidate keys and values with their
   // second copies.
   const bool packets = demand.ray_views < demand.views || demand.views == 0;

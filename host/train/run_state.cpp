@@ -27,6 +27,17 @@ const std::vector<float>& section(const Checkpoint& checkpoint,
   return found->second;
 }
 
+// {signal, number of views} per Gaussian, as checkpoints held before there was prune-weight, with
+// nothing said of what their rays blend.
+std::vector<float> with_weights(const std::vector<float>& older) {
+  std::vector<float> out(older.size() / 2 * kDensityStatistics, 0.0f);
+  for (std::size_t i = 0; 2 * i < older.size(); ++i) {
+    out[kDensityStatistics * i] = older[2 * i];
+    out[kDensityStatistics * i + 1] = older[2 * i + 1];
+  }
+  return out;
+}
+
 std::string mean_section(ParameterGroup group) { return std::string("mean.") + group_name(group); }
 
 }  // namespace
@@ -89,9 +100,12 @@ void restore_state(Context& context,
   gaussians.changed(context);
   adam.set_steps(checkpoint.optimiser_steps);
   const auto statistics = checkpoint.sections.find("density");
-  const bool accumulated = statistics != checkpoint.sections.end() && !statistics->second.empty();
-  density.restore_statistics(accumulated ? section(checkpoint, "density", 2 * count)
-                                         : std::vector<float>());
+  if (statistics == checkpoint.sections.end() || statistics->second.empty())
+    density.restore_statistics({});
+  else if (statistics->second.size() == 2 * count)
+    density.restore_statistics(with_weights(statistics->second));
+  else
+    density.restore_statistics(section(checkpoint, "density", kDensityStatistics * count));
 }
 
 CheckpointSections store_mean(const ParameterMean& mean, Checkpoint& checkpoint) {

@@ -10,6 +10,7 @@ TraceOptions trace_options_of(const TrainOptions& options, const std::array<floa
   TraceOptions trace = options.trace;
   trace.background = background;
   trace.raise_clamped = options.raise_clamped;
+  trace.least_weight = static_cast<float>(options.prune_weight);
   trace.sky.clear();
   trace.depth = options.depth_weight > 0;
   if (options.background == "sky") trace.sky = even_sky(options.sky_degree, background);

@@ -33,7 +33,7 @@ std::vector<Readers> readers_of(const TrainOptions& options) {
        "strategy = adc"},
       {{"densify-signal"}, !mcmc, "strategy = budget or adc"},
       {{"replace-until"}, !adc, "strategy = budget or mcmc"},
-      {{"opacity-decay"}, budget, "strategy = budget"},
+      {{"prune-weight", "opacity-decay"}, budget, "strategy = budget"},
       {{"opacity-reg", "scale-reg", "mcmc-noise"}, mcmc, "strategy = mcmc"},
       {{"opacity-reset-value"}, options.opacity_reset_every > 0, "opacity-reset-every"},
       {{"sky-degree", "sky-lr", "sky-lr-final"}, options.background == "sky", "background = sky"},

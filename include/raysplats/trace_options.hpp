@@ -82,6 +82,9 @@ struct TraceOptions {
   /// The derivative of a colour that is clamped at 0 is 0. With this, gradients that would raise it
   /// pass all the same: training needs them.
   bool raise_clamped = false;
+  /// What a ray blends of a Gaussian, T alpha, that the backward pass takes for nothing: it sums by
+  /// how much the rays that meet a Gaussian blend more (GaussianGradients::screen).
+  float least_weight = 0.0f;
   double launch_budget_ms = -1.0;  ///< of one launch; 0 = unbounded, -1 = the device's default
   std::size_t memory_budget = 0;   ///< bytes for hit lists and private gradients; 0 = a quarter
                                    ///< of the device's memory, from 1 to 4 GiB and no more than

@@ -83,6 +83,9 @@ void bind_trace_options(nb::module_& module) {
       .def_rw("raise_clamped", &TraceOptions::raise_clamped,
               "Where a colour is clamped at 0, gradients that would raise it pass all the same: "
               "what `raysplats train` does.")
+      .def_rw("least_weight", &TraceOptions::least_weight,
+              "What a ray blends of a Gaussian that training takes for nothing (prune_weight of "
+              "TrainOptions).")
       .def_rw("launch_budget_ms", &TraceOptions::launch_budget_ms,
               "Time of one launch; 0 = unbounded, -1 = the device's default.")
       .def_rw("memory_budget", &TraceOptions::memory_budget,

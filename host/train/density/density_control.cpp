@@ -88,8 +88,9 @@ void DensityControl::accumulate(const DeviceGaussians& gaussians,
                                 const GaussianGradients& gradients,
                                 const Buffer<std::uint32_t>* guard) {
   if (options_.densify_signal == DensifySignal::kStep) return;
-  if (statistics_.size() != 2 * gaussians.count) {
-    statistics_ = Buffer<float>(context_, 2 * gaussians.count, "density statistics");
+  if (statistics_.size() != kDensityStatistics * gaussians.count) {
+    statistics_ =
+        Buffer<float>(context_, kDensityStatistics * gaussians.count, "density statistics");
     statistics_.clear();
   }
   const DensifySignal signal_choice =
@@ -113,7 +114,7 @@ void DensityControl::begin_step(const DeviceGaussians& gaussians) {
 
 void DensityControl::end_step(const DeviceGaussians& gaussians,
                               const Buffer<std::uint32_t>& guard) {
-  statistics_ = Buffer<float>(context_, 2 * gaussians.count, "density statistics");
+  statistics_ = Buffer<float>(context_, kDensityStatistics * gaussians.count, "density statistics");
   statistics_.clear();
   context_.kernel(kProgram, "measure_step")
       .launch(Range::linear(gaussians.count, kGroup), static_cast<std::uint32_t>(gaussians.count),
@@ -149,7 +150,7 @@ std::size_t DensityControl::target(std::size_t count, std::int64_t iteration) co
 }
 
 DensityPlan DensityControl::plan(const DeviceGaussians& gaussians, std::int64_t iteration) const {
-  std::vector<float> statistics(2 * gaussians.count, 0.0f);
+  std::vector<float> statistics(kDensityStatistics * gaussians.count, 0.0f);
   const bool known = statistics_.size() == statistics.size();
   if (known) statistics_.download(statistics);
   const std::vector<float> means = gaussians.means.download();
@@ -161,6 +162,7 @@ DensityPlan DensityControl::plan(const DeviceGaussians& gaussians, std::int64_t 
     rules.min_opacity = options_.prune_opacity;
     rules.bounds = options_.bounds;
     rules.remove_unseen = known && whole_passes_ && iteration >= first_ + period_;
+    rules.remove_hardly_seen = rules.remove_unseen;
     return plan_budget(means, scales, opacities, statistics, rules);
   }
   DensityRules rules;
@@ -205,7 +207,7 @@ DensityPlan DensityControl::refine(DeviceGaussians& gaussians, std::int64_t iter
   if (moves && plan.changes()) apply_shares(context_, relocation.shares, gaussians);
   if (decay_ > 0) fade_opacities(gaussians);
   // Without changes the statistics start anew all the same, as in 3DGS.
-  if (statistics_.size() == 2 * gaussians.count) {
+  if (statistics_.size() == kDensityStatistics * gaussians.count) {
     statistics_.clear();
   } else {
     statistics_ = Buffer<float>();
@@ -216,7 +218,7 @@ DensityPlan DensityControl::refine(DeviceGaussians& gaussians, std::int64_t iter
 DensityPlan DensityControl::split_evenly(DeviceGaussians& gaussians, std::size_t most) {
   BudgetRules rules;
   rules.target = most;
-  const std::vector<float> alike(2 * gaussians.count, 1.0f);
+  const std::vector<float> alike(kDensityStatistics * gaussians.count, 1.0f);
   DensityPlan plan = plan_budget(gaussians.means.download(), gaussians.scales.download(),
                                  gaussians.opacities.download(), alike, rules);
   if (plan.changes()) gather(gaussians, plan, 0);

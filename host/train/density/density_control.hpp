@@ -70,7 +70,7 @@ class DensityControl {
   /// Lowers opacities to opacity-reset-value.
   void reset_opacities(DeviceGaussians& gaussians);
 
-  /// {summed signal, number of views} per Gaussian, for checkpoints. Empty before the first
+  /// kDensityStatistics numbers per Gaussian, for checkpoints. Empty before the first
   /// accumulate().
   const Buffer<float>& statistics() const { return statistics_; }
   void restore_statistics(std::span<const float> statistics);

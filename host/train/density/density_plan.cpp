@@ -137,13 +137,14 @@ std::vector<std::uint32_t> DensityPlan::state_source() const {
 }
 
 std::string DensityPlan::remedy() const {
-  const std::array<std::pair<std::size_t, const char*>, 6> reasons{
+  const std::array<std::pair<std::size_t, const char*>, 7> reasons{
       {{outside, "most are outside of --bounds: give a larger box"},
        {faint,
         "most are too faint: lower --prune-opacity or --opacity-lr, or raise --init-opacity"},
        {large, "most are too large: raise --prune-scale, or set it to 0"},
        {small, "most are too small: lower --prune-scale-min"},
        {unseen, "no view meets most of them: see whether cameras and points belong together"},
+       {hardly_seen, "rays blend too little of most of them: lower --prune-weight, or set it to 0"},
        {not_finite, "most are not finite: lower the learning rates"}}};
   return std::max_element(reasons.begin(), reasons.end(),
                           [](const auto& a, const auto& b) { return a.first < b.first; })
@@ -168,8 +169,8 @@ DensityPlan plan_density(std::span<const float> means,
                                                                   : nullptr;
     }
     if (prunes(reason, fates[i], plan)) continue;
-    const float views = statistics[2 * i + 1];
-    const float score = views > 0 ? statistics[2 * i] / views : 0.0f;
+    const float* seen = &statistics[kDensityStatistics * i];
+    const float views = seen[1], score = views > 0 ? seen[0] / views : 0.0f;
     if (views > 0 && score >= rules.gradient) {
       candidates.push_back({score, static_cast<std::uint32_t>(i)});
       fates[i] = size > rules.split_size ? Fate::kSplit : Fate::kClone;
@@ -189,12 +190,14 @@ DensityPlan plan_budget(std::span<const float> means,
   std::vector<Fate> fates(count, Fate::kKeep);
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < count; ++i) {
-    const float views = statistics[2 * i + 1];
+    const float* seen = &statistics[kDensityStatistics * i];
+    const float signal = seen[0], views = seen[1], beyond = seen[2];
     std::size_t* reason = reason_of(plan, means, scales, opacities, rules, i);
     if (reason == nullptr && rules.remove_unseen && !(views > 0)) reason = &plan.unseen;
+    if (reason == nullptr && rules.remove_hardly_seen && beyond < 0) reason = &plan.hardly_seen;
     if (prunes(reason, fates[i], plan)) continue;
-    if (views > 0 && statistics[2 * i] > 0) {
-      candidates.push_back({statistics[2 * i] / views, static_cast<std::uint32_t>(i)});
+    if (views > 0 && signal > 0) {
+      candidates.push_back({signal / views, static_cast<std::uint32_t>(i)});
       fates[i] = Fate::kHalve;
     }
   }

@@ -25,6 +25,10 @@ enum class DensityRole : std::uint32_t {
   kPart = RS_ROLE_PART,  ///< of 3DGS-MCMC; what it shares with the others follows (apply_shares())
 };
 
+/// Numbers per Gaussian of the statistics that density control sums over views: the signal, how
+/// many views saw it, by how much their rays blend more of it than prune-weight.
+inline constexpr std::size_t kDensityStatistics = 3;
+
 /// Thresholds of one pass of density control, in world units.
 struct DensityRules {
   double gradient = 0;     ///< densify at and above this mean signal
@@ -40,10 +44,11 @@ struct DensityRules {
 
 /// Rules of one pass that keeps to a number of Gaussians.
 struct BudgetRules {
-  std::size_t target = 0;        ///< Gaussians after the pass; fewer when there are no candidates
-  double min_opacity = 0;        ///< remove below
-  bool remove_unseen = false;    ///< remove what no ray of any view met
-  std::optional<Bounds> bounds;  ///< remove outside
+  std::size_t target = 0;      ///< Gaussians after the pass; fewer when there are no candidates
+  double min_opacity = 0;      ///< remove below
+  bool remove_unseen = false;  ///< remove what no ray of any view met
+  bool remove_hardly_seen = false;  ///< and what their rays blend too little of
+  std::optional<Bounds> bounds;     ///< remove outside
 };
 
 /// The new set of Gaussians: entry i comes from source[i] in the role role[i]; ordered along the
@@ -55,7 +60,8 @@ struct DensityPlan {
   std::size_t split = 0;
   std::size_t pruned = 0;
   /// Of the pruned, by the first of these that holds.
-  std::size_t not_finite = 0, outside = 0, faint = 0, large = 0, small = 0, unseen = 0;
+  std::size_t not_finite = 0, outside = 0, faint = 0, large = 0, small = 0, unseen = 0,
+              hardly_seen = 0;
   std::size_t refused = 0;  ///< candidates left as they are because of max_count
   /// source[i] where i keeps its state, RS_NO_SOURCE where it is new.
   std::vector<std::uint32_t> state_source() const;
@@ -73,7 +79,7 @@ bool is_finite(std::span<const float> means,
 bool is_outside(const std::optional<Bounds>& bounds, std::span<const float> means, std::size_t i);
 
 /// Decides from host copies of the parameters (means 3 N, scales 3 N and opacities N before
-/// activation) and of the statistics (2 N: summed signal, number of views). A Gaussian that is
+/// activation) and of the statistics (kDensityStatistics N). A Gaussian that is
 /// removed is no candidate; one with a parameter that is not finite is removed. Each candidate adds
 /// one Gaussian; under the cap the highest mean signals win, ties the lower index. Memory O(N),
 /// time O(N log N).
@@ -83,9 +89,9 @@ DensityPlan plan_density(std::span<const float> means,
                          std::span<const float> statistics,
                          const DensityRules& rules);
 
-/// Decides by rank: removes what is transparent, not finite or unseen, and splits the Gaussians
-/// with the highest mean signals along their longest axis until there are `target` (ties: the lower
-/// index). A Gaussian is split once in a pass at most. Arguments, memory and time as
+/// Decides by rank: removes what is transparent, not finite, unseen or hardly seen, and splits the
+/// Gaussians with the highest mean signals along their longest axis until there are `target` (ties:
+/// the lower index). A Gaussian is split once in a pass at most. Arguments, memory and time as
 /// plan_density().
 DensityPlan plan_budget(std::span<const float> means,
                         std::span<const float> scales,

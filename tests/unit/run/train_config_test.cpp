@@ -470,7 +470,7 @@ TEST_CASE("a resumed run keeps its options below those of a file and of the comm
   // A run that is older than a key goes on without what that would change.
   CHECK(resumed(folder / "run").alpha_weight == TrainOptions().alpha_weight);
   std::string older = to_toml(of_run);
-  for (const char* key : {"alpha-weight", "view-footprint"}) {
+  for (const char* key : {"alpha-weight", "prune-weight", "view-footprint"}) {
     const std::size_t begin = older.find(key);
     REQUIRE(begin != std::string::npos);
     older.erase(begin, older.find('\n', begin) + 1 - begin);
@@ -479,6 +479,8 @@ TEST_CASE("a resumed run keeps its options below those of a file and of the comm
   folder.write("older/config.toml", older);
   CHECK(resumed(folder / "older").alpha_weight == 0);
   CHECK(resumed(folder / "older", {"--alpha-weight", "0.5"}).alpha_weight == 0.5);
+  CHECK(resumed(folder / "run").prune_weight == TrainOptions().prune_weight);
+  CHECK(resumed(folder / "older").prune_weight == 0);
   CHECK(resumed(folder / "older").trace.view_footprint == 0);
   TrainOptions shown;
   read_train_config(folder / "older/config.toml", shown);

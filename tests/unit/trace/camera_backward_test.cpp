@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "scene/image/pixel_count.hpp"
 #include "skip_test.hpp"
@@ -82,6 +83,33 @@ Gaussians layered_scene(std::size_t count, float tilt) {
   return out;
 }
 
+// By how much the rays of pixels with a gradient blend more of each Gaussian than `least`, in sum.
+std::vector<double> blended_beyond(const Gaussians& model,
+                                   const TraceOptions& options,
+                                   const Camera& camera,
+                                   const std::vector<float>& image_gradient,
+                                   double least) {
+  const reference::Parameters parameters(model, ScaleActivation::kExp);
+  const auto prepared = reference::prepare_view(parameters, options, camera);
+  const std::size_t pixels = pixel_count(camera.width, camera.height);
+  std::vector<double> out(model.size());
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    bool told = false;
+    for (std::size_t c = 0; c < 4; ++c) told |= image_gradient[c * pixels + pixel] != 0;
+    if (!told) continue;
+    const int column = static_cast<int>(pixel) % camera.width;
+    const int row = static_cast<int>(pixel) / camera.width;
+    const glm::dvec3 direction =
+        glm::transpose(camera.rotation) * reference::pixel_direction(camera, column, row);
+    const reference::RayTrace ray = reference::trace_ray(
+        parameters, prepared, options, camera.center(), direction, 0.0,
+        std::numeric_limits<double>::infinity(), reference::ColorMode::kFromOrigin);
+    for (const reference::Hit& hit : ray.hits)
+      out[hit.index] += hit.transmittance * hit.alpha - least;
+  }
+  return out;
+}
+
 void check_every_variant(const Gaussians& model, const Camera& camera) {
   Context context = make_test_context();
   for_every_variant(
@@ -127,6 +155,36 @@ TEST_CASE("gradients of every SH degree, the direction's part included") {
     CHECK_ERRORS(compare_gradients(context, reference::random_scene(150, 22, degree), {},
                                    reference::cube_camera(25, 19)),
                  1e-3);
+  }
+}
+
+TEST_CASE("what rays blend of each Gaussian equals the double reference [small]") {
+  Context context = make_test_context();
+  const Gaussians model = reference::random_scene(60, 26, 0);
+  const Camera camera = reference::cube_camera(19, 17);
+  for (const Packet& packet : packets({1, 4, 16}, {8, 32})) {
+    for (const GradientSum sum :
+         {GradientSum::kCopies, GradientSum::kExact, GradientSum::kAtomic}) {
+      CAPTURE(packet);
+      CAPTURE(static_cast<int>(sum));
+      TraceOptions options = packet.over({});
+      options.gradient_sum = sum;
+      options.least_weight = 0.02f;
+      const reference::Render render =
+          reference::render(reference::Parameters(model, ScaleActivation::kExp), options, camera);
+      const std::vector<float> image_gradient =
+          without_ties(random_image_gradient(render.pixels(), 3), render);
+      const HostGradients got = gradients_on_device(context, model, options, camera,
+                                                    ScaleActivation::kExp, image_gradient);
+      const std::vector<double> expected = blended_beyond(
+          model, options, camera, image_gradient, static_cast<double>(options.least_weight));
+      std::vector<float> blended;
+      for (std::size_t i = 3; i < got.screen.size(); i += GaussianGradients::kScreenNumbers)
+        blended.push_back(got.screen[i]);
+      CHECK(relative_error(blended, expected) < 1e-4);
+      CHECK(std::ranges::any_of(expected, [](double value) { return value > 0; }));
+      CHECK(std::ranges::any_of(expected, [](double value) { return value < 0; }));
+    }
   }
 }
 

@@ -183,21 +183,25 @@ GradientErrors errors_of(const HostGradients& got, const Expected& expected) {
     CHECK(e_.worst() < (limit));                                                     \
   } while (false)
 
-/// Compares what density control reads: gradient in the picture, its absolute sum and the count.
+/// Compares what density control reads: gradient in the picture, its absolute sum, whether a ray
+/// met it and what rays blend.
 inline void check_screen(const HostGradients& got,
                          const HostGradients& expected,
                          double limit,
                          double limit_absolute) {
-  std::vector<float> screen, absolute;
-  std::vector<double> expected_screen, expected_absolute;
+  std::vector<float> screen, absolute, blended;
+  std::vector<double> expected_screen, expected_absolute, expected_blended;
   REQUIRE(got.screen.size() == expected.screen.size());
-  for (std::size_t i = 0; i < got.screen.size(); i += 3) {
+  for (std::size_t i = 0; i < got.screen.size(); i += GaussianGradients::kScreenNumbers) {
     CHECK(got.screen[i + 2] == expected.screen[i + 2]);
     screen.push_back(got.screen[i]);
     absolute.push_back(got.screen[i + 1]);
     expected_screen.push_back(expected.screen[i]);
     expected_absolute.push_back(expected.screen[i + 1]);
+    blended.push_back(got.screen[i + 3]);
+    expected_blended.push_back(expected.screen[i + 3]);
   }
+  CHECK(relative_error(blended, expected_blended) < limit_absolute);
   CHECK(relative_error(screen, expected_screen) < limit);
   CHECK(relative_error(absolute, expected_absolute) < limit_absolute);
 }

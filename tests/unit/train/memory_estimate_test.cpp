@@ -78,7 +78,7 @@ std::size_t bytes_of_rays(const Gaussians& model,
   tracer.forward_rays(gaussians, reference::cube_camera(width, width), true);
   tracer.backward(gaussians, image_gradient, gradients);
   const std::size_t known =
-      4 * (model.size() * (3 + 4 + 3 + 1 + 3) + model.sh.size()) + sizeof(float) * 4 * pixels;
+      4 * (model.size() * (3 + 4 + 3 + 1 + 4) + model.sh.size()) + sizeof(float) * 4 * pixels;
   return context.peak_allocated_bytes() - before - known;
 }
 
@@ -96,7 +96,7 @@ std::size_t bytes_of_packets(const Gaussians& model, int width, const TraceOptio
   tracer.forward(gaussians, reference::cube_camera(width, width), true);
   tracer.backward(gaussians, image_gradient, gradients);
   const std::size_t known =
-      4 * (model.size() * (3 + 4 + 3 + 1 + 3) + model.sh.size()) + sizeof(float) * 6 * pixels;
+      4 * (model.size() * (3 + 4 + 3 + 1 + 4) + model.sh.size()) + sizeof(float) * 6 * pixels;
   return context.peak_allocated_bytes() - before - known;
 }
 

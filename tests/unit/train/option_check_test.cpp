@@ -36,7 +36,7 @@ std::vector<double*> reals_of(TrainOptions& o) {
       &o.prune_scale_min,    &o.opacity_decay, &o.opacity_reg,   &o.scale_reg,
       &o.mcmc_noise,         &o.footprint,     &o.scale_min,     &o.scale_max,
       &o.opacity_reset_value};
-  out.push_back(&o.alpha_weight);
+  out.insert(out.end(), {&o.alpha_weight, &o.prune_weight});
   for (LearningRate* rate : {&o.position_lr, &o.rotation_lr, &o.scale_lr, &o.opacity_lr, &o.sh_lr,
                              &o.sh_rest_lr, &o.sky_lr, &o.pose_lr}) {
     out.push_back(&rate->initial);

@@ -148,6 +148,31 @@ TEST_CASE("a run that is stopped where it evaluates and density control is due g
   }
 }
 
+TEST_CASE("a run whose density control counted less goes on as it would have") {
+  const Place place;
+  TrainOptions options = growing();
+  options.prune_weight = 0;
+  options.checkpoint_every = 25;  // between two passes
+  const auto straight = place.trainer(options, "straight");
+  straight->run(false);
+  Checkpoint checkpoint = read_checkpoint(checkpoint_path(place.run("straight"), 25));
+  std::vector<float>& density = checkpoint.sections.at("density");
+  REQUIRE(density.size() == 3 * checkpoint.count);
+  std::vector<float> older;
+  for (std::size_t i = 0; i < density.size(); ++i) {
+    if (i % 3 != 2) older.push_back(density[i]);
+  }
+  density = older;
+  write_checkpoint(checkpoint_path(place.run("older"), 25), checkpoint);
+  const auto resumed = place.resumed(options, "older");
+  resumed->run(false);
+  check_equal(straight->gaussians().download(), resumed->gaussians().download());
+
+  density.pop_back();
+  write_checkpoint(checkpoint_path(place.run("damaged"), 25), checkpoint);
+  CHECK(contains(message_of<DataError>([&] { place.resumed(options, "damaged"); }), "'density'"));
+}
+
 TEST_CASE("a run that was killed after a checkpoint knows what it had said of itself until then") {
   const Place place;
   TrainOptions options = growing();

@@ -21,14 +21,16 @@ TEST_CASE("options that nothing of a run reads are named with what would") {
   CHECK(unused_options(options) == "densify-grad-threshold, prune-scale (for strategy = adc)");
   options.strategy = DensityStrategy::kMcmc;
   options.opacity_decay = 0.02;
+  options.prune_weight = 0.01;
   CHECK(unused_options(options) ==
         "densify-grad-threshold, prune-scale (for strategy = adc), densify-signal (for strategy = "
-        "budget or adc), opacity-decay (for strategy = budget)");
+        "budget or adc), prune-weight, opacity-decay (for strategy = budget)");
   options.strategy = DensityStrategy::kAdc;
   options.scale_reg = 0.1;
-  CHECK(unused_options(options) ==
-        "replace-until (for strategy = budget or mcmc), opacity-decay (for strategy = budget), "
-        "scale-reg (for strategy = mcmc)");
+  CHECK(
+      unused_options(options) ==
+      "replace-until (for strategy = budget or mcmc), prune-weight, opacity-decay (for strategy = "
+      "budget), scale-reg (for strategy = mcmc)");
 
   options = TrainOptions();
   options.sky_lr.final_value = 2e-3;

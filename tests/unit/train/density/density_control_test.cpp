@@ -65,7 +65,12 @@ TrainOptions growth(int from, int until, int most) {
 }
 
 struct Views {
-  std::vector<float> screen;  // 3 N
+  std::vector<float> screen;  // kScreenNumbers N
+
+  // Of `count` Gaussians, all numbers of all of them the same.
+  static Views alike(std::size_t count, float value = 1.0f) {
+    return {std::vector<float>(GaussianGradients::kScreenNumbers * count, value)};
+  }
 };
 
 void accumulate(Context& context,
@@ -88,13 +93,15 @@ TEST_CASE("statistics sum the chosen signal over the views that see a Gaussian [
     TrainOptions options = rules();
     options.densify_signal = signal;
     DensityControl control(context, options, 1.0, 1);
-    accumulate(context, control, gaussians, {{1, 10, 1, 2, 20, 0, 3, 30, 1}});
-    accumulate(context, control, gaussians, {{4, 40, 1, 5, 50, 0, 6, 60, 0}});
+    accumulate(context, control, gaussians, {{1, 10, 1, 0.5f, 2, 20, 0, 9, 3, 30, 1, -2}});
+    accumulate(context, control, gaussians, {{4, 40, 1, 0.25f, 5, 50, 0, 9, 6, 60, 0, 9}});
     const float f = signal == DensifySignal::kScreen ? 1.0f : 10.0f;
-    CHECK(control.statistics().download() == std::vector<float>{5 * f, 2, 0, 0, 3 * f, 1});
+    CHECK(control.statistics().download() ==
+          std::vector<float>{5 * f, 2, 0.75f, 0, 0, 0, 3 * f, 1, -2});
     // The sum over a step's four views.
-    accumulate(context, control, gaussians, {{7, 70, 4, 8, 80, 1, 0, 0, 0}});
-    CHECK(control.statistics().download() == std::vector<float>{12 * f, 6, 8 * f, 1, 3 * f, 1});
+    accumulate(context, control, gaussians, {{7, 70, 4, 1, 8, 80, 1, 3, 0, 0, 0, 0}});
+    CHECK(control.statistics().download() ==
+          std::vector<float>{12 * f, 6, 1.75f, 8 * f, 1, 3, 3 * f, 1, -2});
   }
 }
 
@@ -113,7 +120,7 @@ TEST_CASE("the signal step is how far the mean has moved over the extent [small]
   CHECK_FALSE(control.measures_step(9));
   Buffer<std::uint32_t> guard(context, 1, "guard");
   guard.clear();
-  accumulate(context, control, gaussians, {{9, 9, 1, 9, 9, 1, 9, 9, 1}});
+  accumulate(context, control, gaussians, Views::alike(3, 9.0f));
   const std::vector<float> before = gaussians.means.download();
   std::vector<float> after = before;
   after[0] += 0.4f;
@@ -125,11 +132,12 @@ TEST_CASE("the signal step is how far the mean has moved over the extent [small]
   control.end_step(gaussians, guard);
   const std::vector<float> found = control.statistics().download();
   CHECK(found[0] == doctest::Approx(0.1).epsilon(1e-5));
-  CHECK(found[2] == doctest::Approx(0.125).epsilon(1e-5));
+  CHECK(found[3] == doctest::Approx(0.125).epsilon(1e-5));
   CHECK(found[1] == 1);
-  CHECK(found[3] == 1);
-  CHECK(found[4] == 0);
-  CHECK(found[5] == 0);
+  CHECK(found[4] == 1);
+  CHECK(found[6] == 0);
+  CHECK(found[7] == 0);
+  for (std::size_t i = 0; i < 3; ++i) CHECK(found[3 * i + 2] == 0);
   guard.upload(std::vector<std::uint32_t>{1});
   control.end_step(gaussians, guard);
   for (const float value : control.statistics().download()) CHECK(value == 0);
@@ -146,7 +154,7 @@ TEST_CASE("sizes are the longest axis or the norm of all three [small] [tiny]") 
     rules.min_size = 0.01;
     rules.measure = measure;
     rules.max_count = 100;
-    const std::vector<float> statistics{1, 1, 0, 1, 0, 1, 0, 1};
+    const std::vector<float> statistics{1, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0};
     const DensityPlan plan =
         plan_density(model.means, model.log_scales, model.opacities, statistics, rules);
     const bool norm = measure == SizeMeasure::kNorm;
@@ -168,7 +176,7 @@ TEST_CASE("clone, split and prune follow the thresholds [small] [tiny]") {
     DeviceGaussians gaussians = DeviceGaussians::upload(context, model, activation);
     DensityControl control(context, options, 1.0, 1);
     accumulate(context, control, gaussians,
-               {{0.4f, 0, 1, 0.6f, 0, 1, 0.5f, 0, 1, 9, 0, 1, 9, 0, 1, 9, 0, 0}});
+               {{0.4f, 0, 1, 0, 0.6f, 0, 1, 0, 0.5f, 0, 1, 0, 9, 0, 1, 0, 9, 0, 1, 0, 9, 0, 0, 0}});
     const DensityPlan plan = control.refine(gaussians, 100);
     CHECK(plan.cloned == 1);
     CHECK(plan.split == 1);
@@ -228,7 +236,7 @@ TEST_CASE("children are drawn from their parent's distribution, reproducibly") {
     options.seed = seed;
     DeviceGaussians gaussians = DeviceGaussians::upload(context, model, ScaleActivation::kExp);
     DensityControl control(context, options, 1.0, 1);
-    accumulate(context, control, gaussians, {std::vector<float>(3 * kCount, 1.0f)});
+    accumulate(context, control, gaussians, Views::alike(kCount));
     CHECK(control.refine(gaussians, iteration).split == kCount);
     return gaussians.means.download();
   };
@@ -270,8 +278,7 @@ TEST_CASE("under the cap the strongest candidates win [small] [tiny]") {
   std::vector<float> opacities(count, 0.0f), statistics;
   opacities[9] = -20.0f;
   for (std::size_t i = 0; i < count; ++i) {
-    statistics.push_back(static_cast<float>(1 + i % 4));
-    statistics.push_back(1.0f);
+    statistics.insert(statistics.end(), {static_cast<float>(1 + i % 4), 1.0f, 0.0f});
   }
   DensityRules r;
   r.gradient = 0.5;
@@ -359,13 +366,15 @@ TEST_CASE("opacity reset lowers and never raises [small] [tiny]") {
   CHECK(!control.refines_at(550));
 }
 
-TEST_CASE("a budget removes what is transparent or unseen and halves the highest means up to it") {
+TEST_CASE("a budget removes what is not or hardly seen and halves the highest means up to it") {
   // 0 transparent, 1 unseen, 2 to 5 with mean signals 3, 5, 5, 1, 6 not finite.
   std::vector<float> means(21, 0.0f), scales(21, -1.0f), opacities(7, 1.0f);
   opacities[0] = logit(0.001);
   scales[18] = std::numeric_limits<float>::quiet_NaN();
   for (std::size_t i = 0; i < 7; ++i) means[3 * i] = static_cast<float>(i);
-  const std::vector<float> statistics{9, 1, 0, 0, 6, 2, 5, 1, 10, 2, 1, 1, 99, 1};
+  // What rays blend of 3 is too little, of 2 just enough.
+  const std::vector<float> statistics{9,  1,  1, 0, 0, 0, 6, 2,  0, 5, 1,
+                                      -1, 10, 2, 1, 1, 1, 1, 99, 1, 1};
   const auto halved = [&](const BudgetRules& rules) {
     const DensityPlan plan = plan_budget(means, scales, opacities, statistics, rules);
     std::multiset<std::uint32_t> out;
@@ -380,12 +389,14 @@ TEST_CASE("a budget removes what is transparent or unseen and halves the highest
     return std::pair(plan.source.size(), out);
   };
   using Set = std::multiset<std::uint32_t>;
-  CHECK(halved({5, 0.005, false, {}}) == std::pair(std::size_t{5}, Set{}));
-  CHECK(halved({6, 0.005, false, {}}) == std::pair(std::size_t{6}, Set{3}));
-  CHECK(halved({6, 0.005, true, {}}) == std::pair(std::size_t{6}, Set{3, 4}));
-  CHECK(halved({7, 0.005, true, {}}) == std::pair(std::size_t{7}, Set{2, 3, 4}));
-  CHECK(halved({100, 0.005, true, {}}) == std::pair(std::size_t{8}, Set{2, 3, 4, 5}));
-  CHECK(halved({1, 0.005, true, {}}).first == 4);
+  CHECK(halved({5, 0.005, false, false, {}}) == std::pair(std::size_t{5}, Set{}));
+  CHECK(halved({6, 0.005, false, false, {}}) == std::pair(std::size_t{6}, Set{3}));
+  CHECK(halved({6, 0.005, true, false, {}}) == std::pair(std::size_t{6}, Set{3, 4}));
+  CHECK(halved({7, 0.005, true, false, {}}) == std::pair(std::size_t{7}, Set{2, 3, 4}));
+  CHECK(halved({100, 0.005, true, false, {}}) == std::pair(std::size_t{8}, Set{2, 3, 4, 5}));
+  CHECK(halved({1, 0.005, true, false, {}}).first == 4);
+  CHECK(halved({1, 0.005, true, true, {}}).first == 3);
+  CHECK(halved({5, 0.005, true, true, {}}) == std::pair(std::size_t{5}, Set{2, 4}));
 }
 
 TEST_CASE("passes come after whole passes over the photos, near the usual period [small]") {
@@ -433,8 +444,7 @@ TEST_CASE("the budget's count follows its curve to the limit and stays there [sm
   DensityControl control(context, options, 1.0, 7);
   for (std::int64_t iteration = 100; iteration <= 800; iteration += 100) {
     CHECK(control.refines_at(iteration));
-    std::vector<float> screen(3 * gaussians.count, 1.0f);
-    accumulate(context, control, gaussians, {screen});
+    accumulate(context, control, gaussians, Views::alike(gaussians.count));
     control.refine(gaussians, iteration);
     const double left = std::clamp((600.0 - static_cast<double>(iteration)) / 500.0, 0.0, 1.0);
     const double curve = 300.0 - 200.0 * left * left;
@@ -455,9 +465,34 @@ TEST_CASE("what no ray met goes once every photo was looked at [small] [tiny]") 
     DeviceGaussians gaussians =
         DeviceGaussians::upload(context, model_of({0.1, 0.1}, {0.9, 0.9}), ScaleActivation::kExp);
     DensityControl control(context, options, 1.0, 3);
-    accumulate(context, control, gaussians, {{1, 10, 1, 0, 0, 0}});
+    accumulate(context, control, gaussians, {{1, 10, 1, 1, 0, 0, 0, 0}});
     CHECK(control.refine(gaussians, 90).unseen == unseen);
   }
+}
+
+TEST_CASE("what rays blend little of goes behind a second whole pass over the photos [small]") {
+  Context context(test_device());
+  const TrainOptions options = growth(10, 60, 3);
+  const Views views{{1, 10, 1, 0.5f, 1, 10, 1, -0.5f, 1, 10, 1, 0.0f}};
+  for (const std::size_t photos : {10, 5, 3}) {
+    for (const std::int64_t iteration : {10, 20}) {
+      CAPTURE(photos);
+      CAPTURE(iteration);
+      DeviceGaussians gaussians = DeviceGaussians::upload(
+          context, model_of({0.1, 0.1, 0.1}, {0.9, 0.9, 0.9}), ScaleActivation::kExp);
+      DensityControl control(context, options, 1.0, photos);
+      accumulate(context, control, gaussians, views);
+      const DensityPlan plan = control.refine(gaussians, iteration);
+      CHECK(plan.hardly_seen == (iteration == 20 ? 1 : 0));
+      CHECK(plan.pruned == plan.hardly_seen);
+    }
+  }
+  // Ten steps that do not show every photo.
+  DeviceGaussians gaussians = DeviceGaussians::upload(
+      context, model_of({0.1, 0.1, 0.1}, {0.9, 0.9, 0.9}), ScaleActivation::kExp);
+  DensityControl control(context, options, 1.0, 11);
+  accumulate(context, control, gaussians, views);
+  CHECK(control.refine(gaussians, 20).hardly_seen == 0);
 }
 
 TEST_CASE("growth that has one pass alone reaches the limit in it [small] [tiny]") {
@@ -465,7 +500,7 @@ TEST_CASE("growth that has one pass alone reaches the limit in it [small] [tiny]
   DeviceGaussians gaussians = DeviceGaussians::upload(
       context, model_of({0.1, 0.1, 0.1}, {0.9, 0.9, 0.9}), ScaleActivation::kExp);
   DensityControl control(context, growth(50, 50, 5), 1.0, 7);
-  accumulate(context, control, gaussians, {std::vector<float>(9, 1.0f)});
+  accumulate(context, control, gaussians, Views::alike(3));
   control.refine(gaussians, 50);
   CHECK(gaussians.count == 5);
 }
@@ -477,7 +512,7 @@ TEST_CASE("halves lie side by side along the longest axis, fainter and smaller [
     const Gaussians before = model_of({0.2, 0.3, 0.25}, {0.5, 0.9, 0.2});
     DeviceGaussians gaussians = DeviceGaussians::upload(context, before, activation);
     DensityControl control(context, options, 1.0, 1);
-    accumulate(context, control, gaussians, {std::vector<float>(9, 1.0f)});
+    accumulate(context, control, gaussians, Views::alike(3));
     const DensityPlan plan = control.refine(gaussians, 90);
     REQUIRE(plan.split == 3);
     const Gaussians after = gaussians.download();
@@ -521,7 +556,7 @@ TEST_CASE(
   DeviceGaussians gaussians = DeviceGaussians::upload(
       context, model_of({0.1, 0.1, 0.1}, {0.9, 0.05, 0.002}), ScaleActivation::kExp);
   DensityControl control(context, options, 1.0, 1);
-  accumulate(context, control, gaussians, {std::vector<float>(9, 1.0f)});
+  accumulate(context, control, gaussians, Views::alike(3));
   const DensityPlan plan = control.refine(gaussians, 80);
   CHECK(!plan.changes());
   const std::vector<float> logits = gaussians.opacities.download();

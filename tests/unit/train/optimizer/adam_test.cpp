@@ -51,8 +51,8 @@ struct Fixture {
     gaussians.count = n;
     gaussians.sh_degree = sh_degree;
     gaussians.active_sh_degree = sh_degree;
-    screen.assign(3 * n, 1.0f);
-    gradients.screen = Buffer<float>(context(), 3 * n, "screen");
+    screen.assign(GaussianGradients::kScreenNumbers * n, 1.0f);
+    gradients.screen = Buffer<float>(context(), screen.size(), "screen");
     gradient.resize(kGroups);
     twin.parameter.resize(kGroups);
     twin.first.resize(kGroups);
@@ -94,7 +94,7 @@ struct Fixture {
   void twin_step(const AdamOptions& options, const AdamRates& rates, double step) {
     const double group_rates[] = {rates.means, rates.quaternions, rates.scales, rates.opacities};
     for (std::size_t i = 0; i < count; ++i) {
-      if (!finite(i) || (options.visible_only && screen[3 * i + 2] == 0)) continue;
+      if (!finite(i) || (options.visible_only && screen[4 * i + 2] == 0)) continue;
       for (std::size_t g = 0; g < kGroups; ++g) {
         for (std::size_t k = 0; k < width[g]; ++k) {
           const std::size_t at = i * width[g] + k;
@@ -224,7 +224,7 @@ TEST_CASE("adam: visible_only leaves what no ray met alone [small] [tiny]") {
     f.random_gradient();
     for (std::size_t i = 0; i < f.count; ++i) {
       // A block that is hidden as a whole, one that is visible as a whole, and mixed ones.
-      f.screen[3 * i + 2] = i < 64 ? 0.0f : i < 128 ? 1.0f : f.rng.uniform() < 0.5 ? 1.0f : 0.0f;
+      f.screen[4 * i + 2] = i < 64 ? 0.0f : i < 128 ? 1.0f : f.rng.uniform() < 0.5 ? 1.0f : 0.0f;
     }
     f.gradient[0][3 * 5] = std::numeric_limits<float>::quiet_NaN();  // hidden: not counted
     f.upload();

@@ -127,7 +127,7 @@ TEST_CASE("a marked step changes neither parameters nor moments nor statistics")
   ones(gradients.scales, 3 * 130);
   ones(gradients.opacities, 130);
   ones(gradients.sh, gaussians.sh.size());
-  ones(gradients.screen, 3 * 130);
+  ones(gradients.screen, GaussianGradients::kScreenNumbers * 130);
   Adam adam(context, {});
   TrainOptions options;
   DensityControl density(context, options, 1.0, 1);
@@ -140,12 +140,12 @@ TEST_CASE("a marked step changes neither parameters nor moments nor statistics")
   CHECK(gaussians.means.download() == model.means);
   CHECK(gaussians.opacities.download() == model.opacities);
   CHECK(adam.first_moments(ParameterGroup::kSh) == std::vector<float>(gaussians.sh.size(), 0.0f));
-  CHECK(density.statistics().download() == std::vector<float>(260, 0.0f));
+  CHECK(density.statistics().download() == std::vector<float>(3 * 130, 0.0f));
   guard.clear();
   density.accumulate(gaussians, gradients, &guard);
   adam.step(gaussians, gradients, rates, &guard);
   CHECK(gaussians.means.download() != model.means);
-  CHECK(density.statistics().download() == std::vector<float>(260, 1.0f));
+  CHECK(density.statistics().download() == std::vector<float>(3 * 130, 1.0f));
 }
 
 TEST_CASE("a step whose view had no room is marked and counts as if it had not been") {

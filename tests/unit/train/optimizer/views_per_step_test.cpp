@@ -30,6 +30,8 @@ std::vector<float> numbers(std::size_t slot, std::uint64_t part, std::size_t cou
   return out;
 }
 
+constexpr std::size_t kScreen = GaussianGradients::kScreenNumbers * kGaussians;
+
 void fill(Context& context, std::size_t slot, StepGradients& out) {
   out.gaussians.Parameters::ensure(context, kGaussians, kShDegree, "gradients");
   std::uint64_t part = 0;
@@ -37,8 +39,8 @@ void fill(Context& context, std::size_t slot, StepGradients& out) {
     Buffer<float>& buffer = out.gaussians[group];
     buffer.upload(numbers(slot, part++, buffer.size()));
   }
-  out.gaussians.screen.ensure(context, 3 * kGaussians, "screen");
-  out.gaussians.screen.upload(numbers(slot, part++, 3 * kGaussians));
+  out.gaussians.screen.ensure(context, kScreen, "screen");
+  out.gaussians.screen.upload(numbers(slot, part++, kScreen));
   out.sky.ensure(context, 12, "sky");
   out.sky.upload(numbers(slot, part, 12));
 }
