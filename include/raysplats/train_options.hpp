@@ -188,7 +188,7 @@ struct TrainOptions {
   double prune_scale = 0.0;        ///< kAdc removes larger ones; times the scene extent; 0 = off
   double prune_scale_min = 0.0;    ///< kAdc removes smaller ones; likewise
   std::int64_t max_gaussians = 0;  ///< most Gaussians; 0 = by photos, iterations and memory
-  double prune_weight = 0.002;     ///< kBudget removes what the rays that meet it blend less of, on
+  double prune_weight = 0.001;     ///< kBudget removes what the rays that meet it blend less of, on
                                    ///< average; 0 = off
   double opacity_decay = kFitted;  ///< taken off every opacity in each pass; as pass_decay()
   double opacity_reg = 0.01;       ///< weight of the mean opacity in the loss of kMcmc
