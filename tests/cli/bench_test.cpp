@@ -91,9 +91,11 @@ TEST_CASE("bench measures a model seen by a camera") {
              R"({"w":40,"h":30,"fl_x":40,"fl_y":40,"cx":20,"cy":15,"frames":[
                {"file_path":"a.png","transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,6],[0,0,0,1]]},
                {"file_path":"b.png","transform_matrix":[[1,0,0,0],[0,1,0,0],[0,0,1,7],[0,0,0,1]]}]})");
+  // The default budget follows from the memory that is free when a program begins.
   const std::vector<std::string> model{
       "bench",    "--model", folder / "balls.ply", "--cameras", folder / "cameras.json",
-      "--repeat", "1",       "--filter",           "view",      "-q"};
+      "--repeat", "1",       "--filter",           "view",      "--memory-budget",
+      "256",      "-q"};
   const Outcome outcome = raysplats_program(with(model, {"--json", folder / "m.json"}));
   INFO(outcome.err);
   REQUIRE(outcome.code == 0);
